@@ -1,0 +1,45 @@
+"""A ray tracer for the course's scenes: from a `.cli` file to a picture, every decision certain.
+
+    text ──interpreter──> Scene ──make_plan──> Plan ──trace──> hits ──STAGES──> colours ──to_bytes──> picture
+
+    >>> from raytracer import interpreter, render_scene, save_png
+    >>> save_png("sphere.png", render_scene(interpreter("scenes/01_one_sphere.cli")))
+
+The compiler (numba) is loaded when the first picture is drawn, not by this import.
+"""
+
+from raytracer.arrays import Hits
+from raytracer.image import PictureTooLargeError, load_png, save_png
+from raytracer.interpreter import SceneError, interpreter
+from raytracer.plan import Plan, make_plan
+from raytracer.probe import Pixel, probe_pixel
+from raytracer.render import Cancelled, eye_hits, render_scene
+from raytracer.scene import Camera, Light, Material, Scene, Sphere, Triangle
+from raytracer.stages import STAGES, Block, Stage
+from raytracer.trace import ray_intersect_scene
+
+__all__ = [
+    "STAGES",
+    "Block",
+    "Camera",
+    "Cancelled",
+    "Hits",
+    "Light",
+    "Material",
+    "PictureTooLargeError",
+    "Pixel",
+    "Plan",
+    "Scene",
+    "SceneError",
+    "Sphere",
+    "Stage",
+    "Triangle",
+    "eye_hits",
+    "interpreter",
+    "load_png",
+    "make_plan",
+    "probe_pixel",
+    "ray_intersect_scene",
+    "render_scene",
+    "save_png",
+]

@@ -1,0 +1,140 @@
+"""The command line: `python -m raytracer --help`."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+from tqdm import tqdm
+
+from raytracer import Plan, SceneError, interpreter, make_plan, save_png
+from raytracer.camera import SAMPLINGS
+from raytracer.render import draw
+from raytracer.stages import STAGES
+
+
+def render(arguments: argparse.Namespace) -> int:
+    """Draw a scene into a PNG file."""
+    plan = _plan(arguments)
+    for warning in plan.warnings:
+        print(f"{arguments.scene}: {warning}", file=sys.stderr)
+    with tqdm(total=plan.raster.height, unit=" rows", delay=1, leave=False, disable=None) as bar:
+        picture = draw(
+            plan, threads=arguments.threads, progress=lambda done, total, rows: bar.update(rows.stop - rows.start)
+        )
+    save_png(arguments.output, picture)
+    return 0
+
+
+def check(arguments: argparse.Namespace) -> int:
+    """Read scenes and say what is wrong with them, one line an error."""
+    status = 0
+    for path in arguments.scenes:
+        try:
+            interpreter(path)
+        except SceneError as error:
+            print(error)
+            status = 1
+    return status
+
+
+def explain(arguments: argparse.Namespace) -> int:
+    """Say what drawing a scene takes, what it does not, and why."""
+    print(*_plan(arguments).why, sep="\n")
+    return 0
+
+
+def _plan(arguments: argparse.Namespace) -> Plan:
+    width, height = arguments.size
+    return make_plan(interpreter(arguments.scene), arguments.stage, width, height, arguments.sampling)
+
+
+def size(text: str) -> tuple[int, int]:
+    """WxH, or one number for a square."""
+    width, _, height = text.lower().partition("x")
+    try:
+        return int(width), int(height or width)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"found {text!r}, expected WIDTHxHEIGHT, such as 640x480") from None
+
+
+def threads(text: str) -> int:
+    if not (text.isdecimal() and int(text) >= 1):
+        raise argparse.ArgumentTypeError(f"found {text!r}, expected a number of threads, 1 or more")
+    return int(text)
+
+
+class Argument(NamedTuple):
+    """One argument of a command: its names, and what argparse is told about it."""
+
+    names: tuple[str, ...]
+    options: dict[str, object]
+
+
+_SCENE = Argument(("scene",), {"metavar": "SCENE", "type": Path, "help": "a .cli file"})
+_PICTURE = (
+    Argument(("--stage",), {"choices": STAGES, "default": "diffuse", "help": "what is drawn; the default is diffuse"}),
+    Argument(("--size",), {"metavar": "WxH", "type": size, "default": (320, 320), "help": "pixels, default 320x320"}),
+    Argument(
+        ("--sampling",),
+        {"choices": SAMPLINGS, "default": "corner", "help": "where in a pixel its ray goes through, default corner"},
+    ),
+)
+COMMANDS: dict[str, tuple[Callable[[argparse.Namespace], int], tuple[Argument, ...]]] = {
+    "render": (
+        render,
+        (
+            _SCENE,
+            Argument(
+                ("-o", "--output"), {"metavar": "OUT.png", "type": Path, "required": True, "help": "the file to write"}
+            ),
+            *_PICTURE,
+            Argument(("--threads",), {"metavar": "N", "type": threads, "help": "default: as many as there are cores"}),
+        ),
+    ),
+    "check": (check, (Argument(("scenes",), {"metavar": "SCENE", "type": Path, "nargs": "+", "help": ".cli files"}),)),
+    "explain": (explain, (_SCENE, *_PICTURE)),
+}
+
+
+def _parser() -> argparse.ArgumentParser:
+    stages = "\n".join(f"  {name:10}{stage.about}" for name, stage in STAGES.items())
+    parser = argparse.ArgumentParser(
+        prog="python -m raytracer",
+        description="Draw ray-tracing scenes (.cli files) without a window.",
+        epilog=f"stages:\n{stages}\n\nexample:\n"
+        "  python -m raytracer render scenes/04_many_spheres.cli -o spheres.png --stage normal --size 640x480",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    for name, (function, arguments) in COMMANDS.items():
+        command = commands.add_parser(name, help=function.__doc__, description=function.__doc__)
+        command.set_defaults(function=function)
+        for names, options in arguments:
+            command.add_argument(*names, **options)  # type: ignore[arg-type]
+    return parser
+
+
+def main(words: list[str] | None = None) -> int:
+    """Run one command; the exit status is 0, 1 for bad input, 2 for wrong arguments, 130 when interrupted."""
+    arguments = _parser().parse_args(words)
+    try:
+        return int(arguments.function(arguments))
+    except (ValueError, OSError, MemoryError) as error:
+        print(_one_line(error), file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        return 130
+
+
+def _one_line(error: Exception) -> str:
+    if isinstance(error, OSError) and error.filename is not None:
+        return f"{error.filename}: {error.strerror}"
+    return " ".join(str(error).split()) or type(error).__name__
+
+
+if __name__ == "__main__":
+    sys.exit(main())

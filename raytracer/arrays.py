@@ -1,0 +1,69 @@
+"""The arrays that travel between the parts of the tracer: all of it that a kernel ever sees.
+
+Structures of arrays, as NamedTuples because the compiler takes those apart by itself. All numbers are float64 and all
+arrays of one structure have one shape, unless a comment says otherwise.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Hits(NamedTuple):
+    """What rays hit first; whoever needs the point, the normal or the material computes it, once, from these two."""
+
+    t: np.ndarray  # the hit is at origin + t · direction; +inf for a miss
+    index: np.ndarray  # type: ignore[assignment]  # int32, the shape's place among all shapes of the file; −1 for a miss
+
+
+class Rays(NamedTuple):
+    """Directions in float64, with what the error bounds want to know of them.
+
+    Each component of the true direction is within 5u·reach of the one given (u = 2⁻⁵³), for eye rays; the directions
+    of rays given in float64 are the true ones. For both, reach ≥ |D|.
+    """
+
+    x: np.ndarray  # float64, as all
+    y: np.ndarray
+    z: np.ndarray
+    square: np.ndarray  # D·D
+    reach: np.ndarray
+
+
+class TwofoldRays(NamedTuple):
+    """Directions in two-fold float64: each component of the true one is within 2⁻¹⁰²·reach of high + low."""
+
+    x: np.ndarray
+    y: np.ndarray
+    z: np.ndarray
+    x_low: np.ndarray
+    y_low: np.ndarray
+    z_low: np.ndarray
+    reach: np.ndarray
+
+
+class Seen(NamedTuple):
+    """Spheres as seen from one origin: arrays of shape (spheres,)."""
+
+    x: np.ndarray  # L = origin − centre, rounded once
+    y: np.ndarray
+    z: np.ndarray
+    c: np.ndarray  # L·L − r²
+    c_error: np.ndarray  # a bound of c's error; 0 where c is exactly 0
+    size: np.ndarray  # √(L·L + r²)
+    radius: np.ndarray
+
+
+class Nearest(NamedTuple):
+    """The nearest hit of each ray so far; filled in place."""
+
+    t: np.ndarray
+    error: np.ndarray  # a bound of t's error
+    index: np.ndarray  # type: ignore[assignment]  # int32, among the spheres
+    unsure: np.ndarray  # bool: the next level has to decide
+
+    @classmethod
+    def nothing_yet(cls, shape: tuple[int, ...]) -> Nearest:
+        return cls(np.full(shape, np.inf), np.zeros(shape), np.full(shape, -1, np.int32), np.zeros(shape, bool))

@@ -1,0 +1,51 @@
+"""Which of the two paths traces: numpy, at hand at once, or the kernels, fast once their compiler is loaded.
+
+Loading the compiler takes longer than numpy takes for a small picture. Nobody knows how many pictures will follow, so
+numpy is used until it has cost as much as loading would have: then the whole never costs more than twice the best (the
+ski-rental rule: R. Karp, "On-line algorithms versus off-line algorithms", 1992). Both paths find the same bits.
+"""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from threading import Lock
+from types import ModuleType
+
+from raytracer import plain
+
+_PRICE = 0.5  # seconds to load the compiler and what it has compiled before
+_SECONDS_A_TEST, _SECONDS_A_LOOP = 1e-7, 3e-4  # numpy: a ray against a sphere; a sphere against a block of rays
+
+_lock = Lock()
+_loaded: ModuleType | None = None
+_spent = 0.0
+
+
+def has_compiler() -> bool:
+    """Whether numba is installed."""
+    return find_spec("numba") is not None
+
+
+def load() -> ModuleType:
+    """The compiled path, loaded if it was not; the numpy path where numba is not installed."""
+    global _loaded
+    with _lock:
+        if _loaded is None:
+            _loaded = _import_kernels() if has_compiler() else plain
+        return _loaded
+
+
+def choose(tests: int, loops: int) -> ModuleType:
+    """The path for so many tests of a ray against a sphere, in so many loops over rays."""
+    global _spent
+    seconds = tests * _SECONDS_A_TEST + loops * _SECONDS_A_LOOP
+    if _loaded is not None or _spent + seconds > _PRICE:
+        return load()
+    _spent += seconds
+    return plain
+
+
+def _import_kernels() -> ModuleType:
+    import raytracer.kernels
+
+    return raytracer.kernels

@@ -1,0 +1,91 @@
+"""Which pixels can see a sphere: the bounding box of the ellipse that it covers on the screen.
+
+With M = (u, v, −d·w) the frame's matrix and n₁, n₂, n₃ the rows of M⁻¹, the sphere's centre is at x = n₁·(C − O),
+y = n₂·(C − O), z = n₃·(C − O) in the coordinates of the screen, and a ray is (U, V, 1) there. The lines that touch the
+ellipse are those of the dual conic K, Kᵢⱼ = xᵢ xⱼ − r² nᵢ·nⱼ (R. Hartley, A. Zisserman, Multiple View Geometry, 8.3),
+so U lies between the roots of K₃₃ U² − 2 K₁₃ U + K₁₁ = 0:
+
+    U = (K₁₃ ± r √(|x n₃ − z n₁|² − r² |n₁ × n₃|²)) / K₃₃
+
+and V likewise. Written so, the root's argument does not cancel for small spheres.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+
+from raytracer.camera import Raster, focal_length
+from raytracer.scene import Camera
+
+_PAD = 1e-9  # relative, against rounding, beside a pixel all around
+_CROSSES = 1e-6  # K₃₃ / z² below this: the sphere reaches the plane of the eye, the ellipse opens up
+_SKEWED = 1e3  # a frame whose inverse magnifies rounding by more than this gets no boxes
+
+
+def screen_boxes(raster: Raster, eye: np.ndarray, centres: np.ndarray, radii: np.ndarray) -> np.ndarray:
+    """Boxes that hold every pixel whose ray may hit: int32 (s, 4), left, right, top, bottom, ends excluded.
+
+    The eye (3,), the centres (s, 3) and the radii (s,) are in one unit of length, of anyone's choice. A sphere behind
+    the eye has an empty box, one around the eye or beside it that of the whole picture, as has one whose numbers are
+    too large or too small to be squared.
+    """
+    width, height = raster.width, raster.height
+    whole = np.broadcast_to(np.array([0, width, 0, height], np.int32), (len(radii), 4))
+    n = _inverse_frame(raster.camera)
+    if n is None:
+        return np.ascontiguousarray(whole)
+    with np.errstate(all="ignore"):
+        x, y, z = n @ (centres - eye).T
+        r2 = radii * radii
+        k33 = z * z - r2 * (n[2] @ n[2])
+        apart = k33 > _CROSSES * (z * z + r2 * (n[2] @ n[2]))
+        left, right = _range(x, z, radii, n[0], n[2], k33)
+        bottom, top = _range(y, z, radii, n[1], n[2], k33)
+        # U = (2x − W) / H and V = (H − 2y) / H, solved for x and y
+        first = np.stack([(left * height + width) / 2, (1 - top) * height / 2])
+        last = np.stack([(right * height + width) / 2, (1 - bottom) * height / 2])
+        size = np.array([[width], [height]])
+        first, end = np.clip(np.floor(first) - 1, 0, size), np.clip(np.ceil(last) + 2, 0, size)
+        box = np.stack([first[0], end[0], first[1], end[1]], axis=1)
+        known = apart & np.isfinite(box).all(axis=1)
+        box = np.where((known & (z > 0))[:, None], box, 0)
+    return np.where(known[:, None], box, whole).astype(np.int32)
+
+
+def _range(
+    x: np.ndarray, z: np.ndarray, radii: np.ndarray, n1: np.ndarray, n3: np.ndarray, k33: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The ellipse's extent along one axis of the screen, padded."""
+    across = x[:, None] * n3 - z[:, None] * n1
+    normal = np.cross(n1, n3)
+    root = np.sqrt(np.einsum("ij,ij->i", across, across) - radii * radii * (normal @ normal))
+    middle = (x * z - radii * radii * (n1 @ n3)) / k33
+    half = radii * root / k33
+    half = half * (1 + _PAD) + _PAD * np.abs(middle)
+    return middle - half, middle + half
+
+
+def _inverse_frame(camera: Camera) -> np.ndarray | None:
+    """The rows n₁, n₂, n₃ of (u, v, −d·w)⁻¹, or None where it would magnify rounding errors too much."""
+    back = Fraction(focal_length(camera.fov))
+    columns = [
+        [Fraction(x) for x in camera.u],
+        [Fraction(x) for x in camera.v],
+        [-back * Fraction(x) for x in camera.w],
+    ]
+    u, v, w = columns
+    crosses = [_cross(v, w), _cross(w, u), _cross(u, v)]
+    determinant = sum(a * b for a, b in zip(u, crosses[0], strict=True))
+    try:
+        rows = np.array([[float(x / determinant) for x in row] for row in crosses])
+        sizes = [np.linalg.norm([float(x) for x in column]) for column in columns]
+    except OverflowError:
+        return None
+    magnification = max(np.linalg.norm(row) * size for row, size in zip(rows, sizes, strict=True))
+    return rows if magnification < _SKEWED else None
+
+
+def _cross(a: list[Fraction], b: list[Fraction]) -> list[Fraction]:
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]

@@ -1,0 +1,196 @@
+"""Does this ray meet this sphere, where, and is it nearer than another? Answers that know when they do not know.
+
+With D the direction, L = O − C, a = D·D, h = D·L, c = L·L − r² and disc = h² − a·c, the two roots are
+
+    near = c / q,  far = q / a      with q = |h| + √disc, for a ray that comes nearer (h < 0),
+
+neither of which subtracts what is almost equal (Press et al., Numerical Recipes, 5.6). Beside each rounded value goes
+a bound of its error, a forward error analysis in the manner of N. Higham, Accuracy and Stability of Numerical
+Algorithms, ch. 3. A hit or a miss is certain when the value is farther from zero than its bound. What is not certain is
+said to be so, and goes on to the next level: float64, then two-fold float64 (`meet_twofold`), then the integers.
+
+Everything here is plain arithmetic on numbers or arrays alike (see `twofold`). u = 2⁻⁵³ is the unit roundoff.
+
+**The bounds in float64.** m ≥ |D| is the ray's reach; each component of D carries an error of at most 5u·m (eye
+rays), so the vector one of at most 4u·m·(1 + …) in length; l² = L·L + r², and L is rounded once, by u|Lₖ|.
+
+* h: 4.01u from D, 1.01u from L, 3.01u from three products and two sums: |error| < 9u·m·l.
+* a: 2 · 4.01u from D, 3.01u from the sum: |error| < 12u·m².
+* c: `c_error`, which whoever computed c states; at most 8u·l².
+* disc: h² brings 2 · 9u·(m·l)², a·c brings 12u·m²·|c| + m²·c_error, two products and a difference 4u·(m·l)². As
+  |c| ≤ l² that is below 40u·(m·l)² + m²·c_error.
+* √disc: below (error of disc) / √disc. q: that, and twice the error of h (its sign may be wrong by that much).
+
+**In two-fold arithmetic** the same sums hold with u² = 2⁻¹⁰⁶ for u and constants from `twofold`: D within 16u²·m, a dot
+product 13u², so h and a within 64u² = 2⁻¹⁰⁰ of m·l and m²; c within 16u²·l²; disc within 256u² = 2⁻⁹⁸ of (m·l)².
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from raytracer.twofold import (
+    Number,
+    Twofold,
+    add,
+    divide,
+    dot,
+    multiply,
+    select,
+    square_root,
+    two_product,
+    two_sum,
+)
+
+Three = tuple[Number, Number, Number]
+Four = tuple[Number, Number, Number, Number]
+Five = tuple[Number, Number, Number, Number, Number]
+Six = tuple[Number, Number, Number, Number, Number, Number]
+Ten = tuple[*Six, *Four]
+
+U = 2.0**-53
+H_ERROR = 9 * U
+A_ERROR = 12 * U
+C_ERROR = 8 * U
+DISC_ERROR = 40 * U
+H_ERROR_2 = A_ERROR_2 = 2.0**-100
+C_ERROR_2 = 2.0**-102
+DISC_ERROR_2 = 2.0**-98
+
+# Between these sizes of D and L, squares of squares neither overflow nor come near the subnormal numbers.
+SMALLEST, LARGEST = 1e-70, 1e70
+
+# A hit's t is good enough to be shaded when it is off by less than this part of the radius, and of itself.
+T_TOLERANCE = 2.0**-24
+T_TOLERANCE_2 = 2.0**-60
+
+
+def in_range(size: Number) -> Number:
+    """The size, or NaN where the error bounds would not hold; NaN makes every decision uncertain."""
+    return select((size > SMALLEST) & (size < LARGEST), size, np.nan)
+
+
+def look(ox: Number, oy: Number, oz: Number, cx: Number, cy: Number, cz: Number, radius: Number) -> Six:
+    """A sphere as seen from a ray's origin, in float64: L, c and its error, l."""
+    lx, ly, lz = ox - cx, oy - cy, oz - cz
+    square = lx * lx + ly * ly + lz * lz
+    size = square + radius * radius
+    return lx, ly, lz, square - radius * radius, C_ERROR * size, in_range(np.sqrt(size))
+
+
+def look_twofold(
+    ox: Number, oy: Number, oz: Number, cx: Number, cy: Number, cz: Number, radius: Number, on: Number
+) -> Ten:
+    """A sphere as seen from a ray's origin: L without error, c in two-fold float64, its error, l.
+
+    Where `on` is true the origin is known to lie exactly on the sphere, and c is exactly 0.
+    """
+    lx, lx_low = two_sum(ox, -cx)
+    ly, ly_low = two_sum(oy, -cy)
+    lz, lz_low = two_sum(oz, -cz)
+    square, square_low = dot(lx, ly, lz, lx_low, ly_low, lz_low, lx, ly, lz, lx_low, ly_low, lz_low)
+    r2, r2_low = two_product(radius, radius)
+    c, c_low = add(square, square_low, -r2, -r2_low)
+    size = square + r2
+    c, c_low, c_error = select(on, 0.0, c), select(on, 0.0, c_low), select(on, 0.0, C_ERROR_2 * size)
+    return lx, ly, lz, lx_low, ly_low, lz_low, c, c_low, c_error, in_range(np.sqrt(size))
+
+
+def meet(
+    lx: Number, ly: Number, lz: Number, c: Number, c_error: Number, l: Number, radius: Number,  # noqa: E741
+    dx: Number, dy: Number, dz: Number, a: Number, m: Number,
+) -> Three:  # fmt: skip
+    """Where a ray meets a sphere, in float64: t, a bound of its error, and `low`, as `verdict` returns them."""
+    h = dx * lx + dy * ly + dz * lz
+    disc = h * h - a * c
+    root = np.sqrt(abs(disc))
+    q = abs(h) + root
+    far_root = (h < 0.0) & (c <= 0.0)
+    t = select(far_root, q / a, abs(c) / q)
+    part = select(far_root, A_ERROR * (m * m) / a, c_error / abs(c)) + 8 * U
+    limit = T_TOLERANCE * select(t * m < radius, t, radius / m)
+    disc_error = DISC_ERROR * (m * l) * (m * l) + m * m * c_error
+    return verdict(t, h, c, disc, root, q, part, H_ERROR * (m * l), c_error, disc_error, limit)
+
+
+def meet_twofold(
+    lx: Number, ly: Number, lz: Number, lx_low: Number, ly_low: Number, lz_low: Number,
+    c: Number, c_low: Number, c_error: Number, l: Number,  # noqa: E741
+    dx: Number, dy: Number, dz: Number, dx_low: Number, dy_low: Number, dz_low: Number, m: Number,
+) -> Four:  # fmt: skip
+    """`meet` in two-fold float64: t, the rest of t, a bound of the error of their sum, and `low`."""
+    h, h_low = dot(dx, dy, dz, dx_low, dy_low, dz_low, lx, ly, lz, lx_low, ly_low, lz_low)
+    a, a_low = dot(dx, dy, dz, dx_low, dy_low, dz_low, dx, dy, dz, dx_low, dy_low, dz_low)
+    disc, disc_low = discriminant(h, h_low, a, a_low, c, c_low)
+    root, root_low = square_root(*magnitude(disc, disc_low))
+    q, q_low = add(*magnitude(h, h_low), root, root_low)
+    size, size_low = magnitude(c, c_low)
+    far_root = (h < 0.0) & (c <= 0.0)
+    over, over_low = select(far_root, q, size), select(far_root, q_low, size_low)
+    under, under_low = select(far_root, a, q), select(far_root, a_low, q_low)
+    t, t_low = divide(over, over_low, under, under_low)
+    part = select(far_root, A_ERROR_2 * (m * m) / a, c_error / size) + 64 * U * U
+    disc_error = DISC_ERROR_2 * (m * l) * (m * l) + m * m * c_error
+    h_error, limit = H_ERROR_2 * (m * l), T_TOLERANCE_2 * t
+    t, error, low = verdict(t, h, c, disc, root, q, part, h_error, c_error, disc_error, limit)
+    return t, select(t < np.inf, t_low, 0.0), error, low
+
+
+def verdict(
+    t: Number, h: Number, c: Number, disc: Number, root: Number, q: Number,
+    part: Number, h_error: Number, c_error: Number, disc_error: Number, limit: Number,
+) -> Three:  # fmt: skip
+    """What the values and the bounds of their errors say together: t, a bound of its error, and `low`.
+
+    A certain hit has a finite t, a certain miss t = +inf, and both have low = +inf. What is uncertain, or a hit whose
+    error is above the limit, has t = +inf and a finite low: if there is a hit, it is at t ≥ low. c = c_error = 0 says
+    that the origin lies exactly on the sphere; then the root 0 does not count. `part` is the relative error of t that
+    does not come from q. A NaN anywhere makes the case uncertain, with low = 0.
+    """
+    outside, on, inside = c > c_error, (c == 0.0) & (c_error == 0.0), c < -c_error
+    error = t * (part + (2.0 * h_error + disc_error / root) / q)
+    hit = (disc > disc_error) & (inside | ((outside | on) & (h < 0.0))) & (error <= limit)
+    miss = (disc < -disc_error) | ((outside | on) & (h > h_error))
+    largest_q = abs(h) + h_error + np.sqrt(select(disc > 0.0, disc, 0.0) + disc_error)
+    low = (c - c_error) / largest_q * (1.0 - 16.0 * U)
+    low = select(outside & (low > 0.0), low, 0.0)
+    return select(hit, t, np.inf), select(hit, error, 0.0), select(hit | miss, np.inf, low)
+
+
+def magnitude(high: Number, low: Number) -> Twofold:
+    """|high + low|."""
+    return abs(high), select(high < 0.0, -low, low)
+
+
+def discriminant(h: Number, h_low: Number, a: Number, a_low: Number, c: Number, c_low: Number) -> Twofold:
+    """h² − a·c in two-fold float64."""
+    square, square_low = multiply(h, h_low, h, h_low)
+    product, product_low = multiply(a, a_low, c, c_low)
+    return add(square, square_low, -product, -product_low)
+
+
+def contends(t: Number, error: Number, low: Number, best: Number, best_error: Number) -> Number:
+    """Whether a hit as `meet` returns it may be nearer than the best so far."""
+    farthest = best + best_error
+    return ((t < np.inf) & (t - error <= farthest)) | (low < farthest)
+
+
+def nearer(
+    best: Number, best_low: Number, best_error: Number, best_index: Number, unsure: Number,
+    t: Number, t_low: Number, error: Number, low: Number, index: Number,
+) -> Five:  # fmt: skip
+    """The nearest hit so far, after one more sphere: t, its rest and error, the index, and whether all that is unsure.
+
+    The new sphere wins only if it is nearer by more than both errors; closer than that to a tie, nobody knows yet.
+    """
+    gap = (t - best) + (t_low - best_low)
+    close = error + best_error
+    wins = gap < -close
+    tie = (gap >= -close) & (gap <= close)
+    return (
+        select(wins, t, best),
+        select(wins, t_low, best_low),
+        select(wins, error, best_error),
+        select(wins, index, best_index),
+        unsure | tie | (low < best + best_error),
+    )

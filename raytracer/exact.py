@@ -1,0 +1,136 @@
+"""The truth, in integers: what a ray hits when nothing is ever rounded. No kernel, no float arithmetic, no numpy.
+
+Every finite float64 is an integer times a power of two, so a ray and its spheres can be scaled, exactly, until all of
+their numbers are integers. Then
+
+    the ray's line meets the sphere  ⇔  |D × L|² ≤ r² · D·D        (the distance of the centre from the line)
+    the roots are (−D·L ± √Δ) / D·D  with Δ = r² · D·D − |D × L|²
+
+where L = origin − centre. Signs of integers are certain, and two roots are put in order by squaring.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from fractions import Fraction
+from math import inf, isqrt, lcm
+from typing import NamedTuple
+
+Exact = float | Fraction  # a finite float64 stands for itself, exactly
+
+
+class Root(NamedTuple):
+    """The number (base + sign · √radicand) / divisor · scale, base and radicand being integers."""
+
+    base: int
+    sign: int
+    radicand: int
+    divisor: int
+    scale: Fraction
+
+    def is_nearer(self, other: Root) -> bool:
+        """Whether this root comes before another of the same ray."""
+        return _sign_with_two_roots(self.base - other.base, self.sign, self.radicand, other.sign, other.radicand) < 0
+
+    def nearest_float(self) -> float:
+        """The float64 nearest to the root: +inf beyond the largest."""
+        bits = 0
+        while True:
+            root = isqrt(self.radicand << 2 * bits)
+            exact = root * root == self.radicand << 2 * bits
+            low = (self.base << bits) + self.sign * root
+            high = low if exact else low + self.sign
+            low_float, high_float = (_ratio(n * self.scale.numerator, self._denominator << bits) for n in (low, high))
+            if low_float == high_float:
+                return low_float
+            bits += 64
+
+    @property
+    def _denominator(self) -> int:
+        return self.divisor * self.scale.denominator
+
+
+def nearest_hit(
+    origin: Sequence[Exact], direction: Sequence[Exact], spheres: Iterable[tuple[Sequence[Exact], Exact]]
+) -> tuple[float, int]:
+    """What a ray hits first of spheres (centre, radius): t, rounded to the nearest float64, and which; or (+inf, −1).
+
+    Only t > 0 counts; a tangent ray hits; from inside, the far root is the hit; of equal roots the first sphere's wins.
+    """
+    best, index = None, -1
+    for i, root in enumerate(hits(origin, direction, spheres)):
+        if root is not None and (best is None or root.is_nearer(best)):
+            best, index = root, i
+    return (inf, -1) if best is None else (best.nearest_float(), index)
+
+
+def hits(
+    origin: Sequence[Exact], direction: Sequence[Exact], spheres: Iterable[tuple[Sequence[Exact], Exact]]
+) -> list[Root | None]:
+    """The smallest positive root of each sphere, or None for a miss."""
+    spheres = list(spheres)
+    lengths = [*origin, *(number for centre, radius in spheres for number in (*centre, radius))]
+    integers, unit = _integers(lengths)
+    steps, step_unit = _integers(direction)
+    scale = unit / step_unit
+    eye = integers[:3]
+    return [_hit(eye, steps, integers[k : k + 3], integers[k + 3], scale) for k in range(3, len(integers), 4)]
+
+
+def side(origin: Sequence[Exact], centre: Sequence[Exact], radius: Exact) -> Fraction:
+    """c = |origin − centre|² − radius²: negative inside the sphere, zero on it, positive outside."""
+    distances = (Fraction(o) - Fraction(c) for o, c in zip(origin, centre, strict=True))
+    return sum((x * x for x in distances), Fraction(0)) - Fraction(radius) ** 2
+
+
+def _hit(eye: list[int], steps: list[int], centre: list[int], radius: int, scale: Fraction) -> Root | None:
+    dx, dy, dz = steps
+    lx, ly, lz = (e - c for e, c in zip(eye, centre, strict=True))
+    a = dx * dx + dy * dy + dz * dz
+    x, y, z = dy * lz - dz * ly, dz * lx - dx * lz, dx * ly - dy * lx
+    radicand = radius * radius * a - (x * x + y * y + z * z)
+    if radicand < 0:
+        return None
+    middle = -(dx * lx + dy * ly + dz * lz)
+    for sign in (-1, 1):
+        if _sign_with_root(middle, sign, radicand) > 0:
+            return Root(middle, sign, radicand, a, scale)
+    return None
+
+
+def _sign_with_root(base: int, sign: int, radicand: int) -> int:
+    """The sign of base + sign · √radicand."""
+    if base * sign >= 0:
+        return _sign(base) or (sign if radicand else 0)
+    return _sign(base) * _sign(base * base - radicand)
+
+
+def _sign_with_two_roots(base: int, sign: int, radicand: int, less_sign: int, less_radicand: int) -> int:
+    """The sign of base + sign · √radicand − less_sign · √less_radicand."""
+    roots = sign if sign != less_sign else sign * _sign(radicand - less_radicand)
+    if sign != less_sign and radicand == less_radicand == 0:
+        roots = 0
+    if roots * base >= 0:
+        return _sign(base) or roots
+    # |base| against |roots|: base² − (√radicand ∓ √less_radicand)²
+    rest = base * base - radicand - less_radicand
+    return _sign(base) * _sign_with_root(rest, sign * less_sign, 4 * radicand * less_radicand)
+
+
+def _sign(number: int) -> int:
+    return (number > 0) - (number < 0)
+
+
+def _integers(numbers: Iterable[Exact]) -> tuple[list[int], Fraction]:
+    """Integers, and the unit that they count: numbers = integers · unit."""
+    ratios = [number.as_integer_ratio() for number in numbers]
+    denominator = lcm(*(d for _, d in ratios))
+    return [n * (denominator // d) for n, d in ratios], Fraction(1, denominator)
+
+
+def _ratio(numerator: int, denominator: int) -> float:
+    """Rounded to nearest; Python's division of integers is, but for its refusal to overflow."""
+    try:
+        return numerator / denominator
+    except OverflowError:
+        return inf

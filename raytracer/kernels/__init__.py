@@ -1,0 +1,8 @@
+"""The compiled path: the same formulas as the numpy path, run pixel by pixel. Importing this loads numba."""
+
+from raytracer.kernels.compiler import cache_named_after_sources
+
+with cache_named_after_sources():
+    from raytracer.kernels.trace import nearest_eye, nearest_given, nearest_twofold, polish, see
+
+__all__ = ["nearest_eye", "nearest_given", "nearest_twofold", "polish", "see"]

@@ -1,0 +1,56 @@
+"""The one place that says how kernels are compiled.
+
+No fast-math flag: contracting a·a − b·b turns it into noise, reassociation breaks every error-free sum, and assuming
+that there is no NaN or infinity deletes the test for a miss. Division by zero gives what IEEE 754 says, no exception.
+
+The arithmetic that numpy runs on arrays is compiled here for single numbers, from the same source. numba's cache looks
+at the file of a kernel only, not at the files it calls into; so the cache lies in a folder named after all of these.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from types import FunctionType, ModuleType
+
+import numba
+from numba.extending import overload, register_jitable
+
+from raytracer import certified, twofold
+
+compiled = partial(numba.njit, cache=True, nogil=True, error_model="numpy")
+
+
+@overload(twofold.select)
+def _select(condition, yes, no):
+    return lambda condition, yes, no: yes if condition else no
+
+
+def _compile_calls_into(module: ModuleType) -> None:
+    """Let kernels call every function that this module defines."""
+    for function in vars(module).values():
+        own = isinstance(function, FunctionType) and function.__module__ == module.__name__
+        if own and function is not twofold.select:
+            register_jitable(function)
+
+
+_SOURCES = (twofold, certified)
+for _module in _SOURCES:
+    _compile_calls_into(_module)
+
+
+@contextmanager
+def cache_named_after_sources() -> Iterator[None]:
+    """While this lasts, kernels that are defined take their machine code from, and put it into, that folder."""
+    folder = Path(__file__).parent
+    sources = [Path(module.__file__ or "") for module in _SOURCES] + sorted(folder.glob("*.py"))
+    digest = hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(folder / "__pycache__" / digest[:16])
+    try:
+        yield
+    finally:
+        numba.config.CACHE_DIR = before

@@ -1,0 +1,173 @@
+"""What a scene file says, and nothing else: no picture size, no stage, no way of tracing.
+
+Small things (camera, lights) are plain frozen dataclasses. Whatever a file may hold a million of (materials, spheres,
+triangles) is held as arrays behind the face of a sequence: `scene.spheres[i]` is a `Sphere`, made when asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TypeVar, overload
+
+import numpy as np
+
+Vector = tuple[float, float, float]
+Colour = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Camera:
+    """Where the eye is and how it looks: frame u (right), v (up), w (backwards); fov is vertical, in degrees."""
+
+    eye: Vector = (0.0, 0.0, 0.0)
+    u: Vector = (1.0, 0.0, 0.0)
+    v: Vector = (0.0, 1.0, 0.0)
+    w: Vector = (0.0, 0.0, 1.0)
+    fov: float = 60.0
+
+
+@dataclass(frozen=True)
+class Light:
+    """A point light; its light does not fade with distance."""
+
+    position: Vector
+    colour: Colour
+
+
+@dataclass(frozen=True)
+class Material:
+    """How a shape answers light: the words of the `surface` command, in its order."""
+
+    diffuse: Colour = (0.0, 0.0, 0.0)
+    ambient: Colour = (0.0, 0.0, 0.0)
+    specular: Colour = (0.0, 0.0, 0.0)
+    power: float = 1.0
+    k_refl: float = 0.0
+
+
+@dataclass(frozen=True)
+class Sphere:
+    radius: float
+    centre: Vector
+    material: Material
+
+
+@dataclass(frozen=True)
+class Triangle:
+    vertices: tuple[Vector, Vector, Vector]
+    material: Material
+
+
+Shape = Sphere | Triangle
+
+
+Row = TypeVar("Row")
+
+
+def vector(row: np.ndarray) -> Vector:
+    """An array of three numbers as a tuple."""
+    x, y, z = row.tolist()
+    return x, y, z
+
+
+class _Table(Sequence[Row]):
+    """A read-only sequence whose rows live in arrays; a subclass says which arrays, and how row i is made of them."""
+
+    def __post_init__(self) -> None:
+        for array in self.arrays():
+            array.flags.writeable = False
+
+    def arrays(self) -> list[np.ndarray]:
+        return [value for value in vars(self).values() if isinstance(value, np.ndarray)]
+
+    def _row(self, i: int) -> Row:
+        raise NotImplementedError
+
+    def __len__(self) -> int:
+        return len(self.arrays()[0])
+
+    @overload
+    def __getitem__(self, i: int) -> Row: ...
+    @overload
+    def __getitem__(self, i: slice) -> Sequence[Row]: ...
+    def __getitem__(self, i: int | slice) -> Row | Sequence[Row]:
+        if isinstance(i, slice):
+            return [self._row(k) for k in range(*i.indices(len(self)))]
+        return self._row(range(len(self))[i])
+
+    def __eq__(self, other: object) -> bool:
+        if type(other) is not type(self):
+            return NotImplemented
+        return all(np.array_equal(a, b) for a, b in zip(self.arrays(), other.arrays(), strict=True))
+
+    def __hash__(self) -> int:
+        return hash((type(self), len(self)))
+
+    def __repr__(self) -> str:
+        return f"<{len(self)} {type(self).__name__.lower()}>"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Materials(_Table[Material]):
+    """Materials as the columns dr dg db  ar ag ab  sr sg sb  power  k_refl of one array."""
+
+    table: np.ndarray = field(default_factory=lambda: np.empty((0, 11)))  # (m, 11) float64
+
+    def _row(self, i: int) -> Material:
+        row = self.table[i]
+        return Material(vector(row[0:3]), vector(row[3:6]), vector(row[6:9]), float(row[9]), float(row[10]))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Spheres(_Table[Sphere]):
+    """Spheres as arrays. `order` is the place of each among all shapes of the file, counted from 0, ascending."""
+
+    radii: np.ndarray = field(default_factory=lambda: np.empty(0))  # (n,) float64
+    centres: np.ndarray = field(default_factory=lambda: np.empty((0, 3)))  # (n, 3) float64
+    material: np.ndarray = field(default_factory=lambda: np.empty(0, np.int32))  # (n,) int32, row of `materials`
+    order: np.ndarray = field(default_factory=lambda: np.empty(0, np.int32))  # (n,) int32
+    materials: Materials = Materials()
+
+    def _row(self, i: int) -> Sphere:
+        return Sphere(float(self.radii[i]), vector(self.centres[i]), self.materials[self.material[i]])
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Triangles(_Table[Triangle]):
+    """Triangles as arrays, `order` as for `Spheres`."""
+
+    vertices: np.ndarray = field(default_factory=lambda: np.empty((0, 3, 3)))  # (n, 3, 3) float64: vertex, axis
+    material: np.ndarray = field(default_factory=lambda: np.empty(0, np.int32))  # (n,) int32, row of `materials`
+    order: np.ndarray = field(default_factory=lambda: np.empty(0, np.int32))  # (n,) int32
+    materials: Materials = Materials()
+
+    def _row(self, i: int) -> Triangle:
+        first, second, third = self.vertices[i]
+        return Triangle((vector(first), vector(second), vector(third)), self.materials[self.material[i]])
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Everything a `.cli` file says. Two scenes are equal when they say the same, wherever they were read from."""
+
+    camera: Camera = Camera()
+    background: Colour = (0.0, 0.0, 0.0)
+    lights: tuple[Light, ...] = ()
+    materials: Materials = Materials()
+    spheres: Spheres = Spheres()
+    triangles: Triangles = Triangles()
+    path: Path | None = field(default=None, compare=False)
+
+    def __len__(self) -> int:
+        """The number of shapes, of all kinds."""
+        return len(self.spheres) + len(self.triangles)
+
+    def shape(self, index: int) -> Shape:
+        """The shape at this place among all shapes of the file, counted from 0: what `Hits.index` names."""
+        for table in (self.spheres, self.triangles):
+            i = int(np.searchsorted(table.order, index))
+            if i < len(table) and table.order[i] == index:
+                return table[i]
+        raise IndexError(f"shape {index} of a scene of {len(self)}")

@@ -1,0 +1,223 @@
+"""The nearest hit of every ray, certain: float64 first, then two-fold float64, then integers, each for what is open."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from fractions import Fraction
+from types import ModuleType
+from typing import NamedTuple
+
+import numpy as np
+
+from raytracer import backend, exact
+from raytracer.arrays import Hits, Nearest, Seen, TwofoldRays
+from raytracer.boxes import screen_boxes
+from raytracer.camera import Raster, eye_rays, given_rays, twofold_eye_rays, twofold_given_rays
+from raytracer.certified import U, contends, look, meet
+from raytracer.plain import xyz
+from raytracer.scene import Scene, vector
+from raytracer.units import in_units, unit_directions
+
+_CHUNK = 1 << 14  # rays that are traced together: their arrays fit a core's cache
+
+Index = tuple[np.ndarray, ...]
+
+
+class Targets(NamedTuple):
+    """The spheres that rays are traced against, and who traces."""
+
+    centres: np.ndarray  # (s, 3)
+    radii: np.ndarray  # (s,)
+    on: np.ndarray  # bool (s,): all rays are known to start exactly on this sphere
+    path: ModuleType  # `raytracer.plain` or `raytracer.kernels`
+
+
+class Eye(NamedTuple):
+    """All that the rays of one picture share."""
+
+    raster: Raster
+    unit: int  # lengths below are counted in 2**unit of the scene's
+    origin: np.ndarray  # (3,)
+    order: np.ndarray  # int32 (s,), the places in the file of the spheres in view
+    targets: Targets  # the spheres in view
+    seen: Seen
+    boxes: np.ndarray  # int32 (s, 4), see `screen_boxes`
+    tests: int  # how many times a ray is tested against a sphere, in float64
+
+
+def open_eye(scene: Scene, raster: Raster) -> Eye:
+    """Everything about the picture's spheres that does not depend on the pixel; those out of view are left out."""
+    spheres = scene.spheres
+    unit, (origin, centres, radii) = in_units(np.array(scene.camera.eye), spheres.centres, spheres.radii)
+    boxes = screen_boxes(raster, origin, centres, radii)
+    in_view = (boxes[:, 1] > boxes[:, 0]) & (boxes[:, 3] > boxes[:, 2])
+    order, boxes, centres, radii = spheres.order[in_view], boxes[in_view], centres[in_view], radii[in_view]
+    left, right, top, bottom = boxes.astype(np.int64).T
+    tests = int(((right - left) * (bottom - top)).sum())
+    path = backend.choose(tests, len(raster.bands) * len(radii))
+    with np.errstate(all="ignore"):
+        seen = path.see(origin, centres, radii)
+    on = _settle_sides(origin, centres, radii, seen)
+    return Eye(raster, unit, origin, order, Targets(centres, radii, on, path), seen, boxes, tests)
+
+
+def trace_rows(eye: Eye, rows: slice) -> Hits:
+    """What the eye rays of these rows of the picture hit first: t good enough to be shaded, not to the last digit."""
+    return _in_file_order(eye, _trace_rows(eye, rows))
+
+
+def polished_rows(eye: Eye, rows: slice) -> Hits:
+    """`trace_rows`, with t to the last digit."""
+    nearest = _trace_rows(eye, rows)
+    _polish(nearest, _pixels_of(eye, rows), eye.targets)
+    return _in_file_order(eye, nearest)
+
+
+def ray_intersect_scene(origins: np.ndarray, directions: np.ndarray, centres: np.ndarray, radii: np.ndarray) -> Hits:
+    """What each of n rays hits first of s spheres: `Hits` of shape (n,), `index` counting the spheres given.
+
+    origins and directions are (n, 3), centres (s, 3), radii (s,), all finite, in one unit of length; directions need
+    no normalising, t counts multiples of them. Which sphere is hit is what exact arithmetic says: only t > 0 counts, a
+    tangent ray hits, from inside the far root is the hit, and of equal t the sphere that comes first wins.
+
+    ValueError: a direction is zero, a number is not finite, a radius is not positive, or the shapes do not fit.
+    """
+    origins, directions = _vectors("origins", origins), _vectors("directions", directions)
+    centres, radii = _vectors("centres", centres), np.ascontiguousarray(radii, np.float64)
+    _refuse_bad_rays(origins, directions, centres, radii)
+    path = backend.choose(len(origins) * len(radii), -(-len(origins) // _CHUNK) * len(radii))
+    unit, (origins, centres, radii) = in_units(origins, centres, radii)
+    exponents, directions = unit_directions(directions)
+    targets = Targets(centres, radii, np.zeros(len(radii), bool), path)
+    hits = Hits(np.empty(len(origins)), np.empty(len(origins), np.int32))
+    for start in range(0, len(origins), _CHUNK):
+        some = slice(start, start + _CHUNK)
+        hits.t[some], hits.index[some] = _trace_given(origins[some], directions[some], targets)
+    with np.errstate(over="ignore", under="ignore"):
+        return Hits(np.ldexp(hits.t, unit - exponents), hits.index)
+
+
+def _trace_given(origins: np.ndarray, directions: np.ndarray, targets: Targets) -> Hits:
+    nearest = Nearest.nothing_yet((len(origins),))
+    with np.errstate(all="ignore"):
+        targets.path.nearest_given(origins, given_rays(directions), targets.centres, targets.radii, nearest)
+
+    def rays_of(which: Index) -> Bundle:
+        chosen = directions[which]
+        return Bundle(origins[which], twofold_given_rays(chosen), lambda k: [Fraction(x) for x in vector(chosen[k])])
+
+    _settle(nearest, rays_of, targets)
+    _polish(nearest, rays_of, targets)
+    return Hits(nearest.t, nearest.index)
+
+
+def _trace_rows(eye: Eye, rows: slice) -> Nearest:
+    rays = eye_rays(eye.raster, rows)
+    nearest = Nearest.nothing_yet(rays.x.shape)
+    with np.errstate(all="ignore"):
+        eye.targets.path.nearest_eye(rays, eye.seen, eye.boxes, rows.start, nearest)
+    _settle(nearest, _pixels_of(eye, rows), eye.targets)
+    return nearest
+
+
+def _in_file_order(eye: Eye, nearest: Nearest) -> Hits:
+    t = np.ldexp(nearest.t, eye.unit) if eye.unit else nearest.t
+    if not len(eye.order):
+        return Hits(t, nearest.index)
+    return Hits(t, np.where(nearest.index >= 0, eye.order[nearest.index], np.int32(-1)))
+
+
+class Bundle(NamedTuple):
+    """Some of the rays, as the levels above float64 want them."""
+
+    origins: np.ndarray  # (n, 3)
+    rays: TwofoldRays  # (n,)
+    exact_direction: Callable[[int], Sequence[Fraction]]  # of ray k of these
+
+
+def _settle_sides(origin: np.ndarray, centres: np.ndarray, radii: np.ndarray, seen: Seen) -> np.ndarray:
+    """Find out exactly whether the origin is inside, on or outside the spheres of which `see` is not certain.
+
+    Returns on which it is, bool (s,). Where c cannot be held in a float64 it stays uncertain.
+    """
+    on = np.zeros(len(radii), bool)
+    for i in np.flatnonzero(~(np.abs(seen.c) > seen.c_error) | ~np.isfinite(seen.c)):
+        c = exact.side(vector(origin), vector(centres[i]), float(radii[i]))
+        on[i] = c == 0
+        if c == 0 or 1e-280 < abs(c) < 1e280:
+            seen.c[i] = float(c)
+            seen.c_error[i] = U * abs(float(c))
+    return on
+
+
+def _pixels_of(eye: Eye, rows: slice) -> Callable[[Index], Bundle]:
+    def rays_of(which: Index) -> Bundle:
+        ys, xs = which[0] + rows.start, which[1]
+        origins = np.repeat(eye.origin[None], len(xs), axis=0)
+        return Bundle(
+            origins, twofold_eye_rays(eye.raster, xs, ys), lambda k: eye.raster.exact_direction(int(xs[k]), int(ys[k]))
+        )
+
+    return rays_of
+
+
+def _settle(nearest: Nearest, rays_of: Callable[[Index], Bundle], targets: Targets) -> None:
+    """Decide what float64 left open: in two-fold arithmetic, and what that leaves open in integers."""
+    pending = np.nonzero(nearest.unsure)
+    if not pending[0].size:
+        return
+    bundle, (centres, radii, on, path) = rays_of(pending), targets
+    found = Nearest.nothing_yet(pending[0].shape)
+    with np.errstate(all="ignore"):
+        path.nearest_twofold(bundle.origins, bundle.rays, centres, radii, on, found)
+    for k in np.flatnonzero(found.unsure).tolist():
+        found.t[k], found.index[k] = _nearest_exactly(bundle, k, targets)
+        found.error[k] = 0.0
+    for array, value in zip(nearest, found, strict=True):
+        array[pending] = value
+
+
+def _nearest_exactly(bundle: Bundle, k: int, targets: Targets) -> tuple[float, int]:
+    """Ray k against all spheres that float64 cannot rule out, in integers."""
+    origin, centres, radii = bundle.origins[k], targets.centres, targets.radii
+    ray = (bundle.rays.x[k], bundle.rays.y[k], bundle.rays.z[k])
+    with np.errstate(all="ignore"):
+        square = np.float64(ray[0] * ray[0] + ray[1] * ray[1] + ray[2] * ray[2])
+        seen = look(*vector(origin), *xyz(centres), radii)
+        t, error, low = meet(*seen, radii, *ray, square, bundle.rays.reach[k])
+        candidates = np.flatnonzero(contends(t, error, low, (t + error).min(), 0.0))
+    spheres = [(centres[i].tolist(), float(radii[i])) for i in candidates]
+    t_exact, index = exact.nearest_hit(vector(origin), bundle.exact_direction(k), spheres)
+    return t_exact, int(candidates[index]) if index >= 0 else -1
+
+
+def _polish(nearest: Nearest, rays_of: Callable[[Index], Bundle], targets: Targets) -> None:
+    """Bring the t of hits to the last digit, where its error may be larger."""
+    which = np.nonzero(nearest.error > U * np.where(np.isfinite(nearest.t), nearest.t, 0))
+    if which[0].size:
+        bundle, (centres, radii, on, path), spheres = rays_of(which), targets, nearest.index[which]
+        with np.errstate(all="ignore"):
+            t = path.polish(bundle.origins, bundle.rays, centres[spheres], radii[spheres], on[spheres])
+        nearest.t[which] = np.where(np.isfinite(t), t, nearest.t[which])
+
+
+def _vectors(name: str, vectors: np.ndarray) -> np.ndarray:
+    array = np.ascontiguousarray(vectors, np.float64)
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise ValueError(f"{name}: found an array of shape {array.shape}, expected (n, 3)")
+    if not np.isfinite(array).all():
+        raise ValueError(f"{name}: row {np.argmin(np.isfinite(array).all(axis=1))} is not finite")
+    return array
+
+
+def _refuse_bad_rays(origins: np.ndarray, directions: np.ndarray, centres: np.ndarray, radii: np.ndarray) -> None:
+    if len(origins) != len(directions):
+        raise ValueError(f"found {len(origins)} origins and {len(directions)} directions, expected as many")
+    if radii.shape != (len(centres),):
+        raise ValueError(f"radii: found shape {radii.shape}, expected ({len(centres)},), one a centre")
+    zero = np.flatnonzero(~directions.any(axis=1))
+    if zero.size:
+        raise ValueError(f"directions: row {zero[0]} is zero, and points nowhere")
+    bad = np.flatnonzero(~((radii > 0) & np.isfinite(radii)))
+    if bad.size:
+        raise ValueError(f"radii: number {bad[0]} is {radii[bad[0]]}, expected a finite number above 0")

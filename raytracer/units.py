@@ -1,0 +1,33 @@
+"""Powers of two taken out, exactly, so that squares neither overflow nor underflow."""
+
+from __future__ import annotations
+
+import numpy as np
+
+_TOO_SMALL, _TOO_LARGE = 1e-50, 1e50
+
+
+def in_units(*lengths: np.ndarray) -> tuple[int, list[np.ndarray]]:
+    """An exponent e and the lengths counted in units of 2ᵉ; e is 0 unless they are very large or all very small.
+
+    The lengths stay as they are, e = 0, if some of them would lose digits.
+    """
+    largest = max((float(np.abs(array).max(initial=0.0)) for array in lengths), default=0.0)
+    if largest == 0.0 or _TOO_SMALL < largest < _TOO_LARGE:
+        return 0, list(lengths)
+    exponent = int(np.frexp(largest)[1])
+    scaled = [np.ldexp(array, -exponent) for array in lengths]
+    if any((np.ldexp(array, exponent) != length).any() for array, length in zip(scaled, lengths, strict=True)):
+        return 0, list(lengths)
+    return exponent, scaled
+
+
+def unit_directions(directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Exponents e (n,) and directions (n, 3) such that direction · 2ᵉ is the one given, and near 1 in length.
+
+    A direction whose components differ so much that one would lose digits stays as it is, with e = 0.
+    """
+    exponents = np.frexp(np.abs(directions).max(axis=1, initial=0.0))[1]
+    scaled = np.ldexp(directions, -exponents[:, None])
+    exact = (np.ldexp(scaled, exponents[:, None]) == directions).all(axis=1)
+    return np.where(exact, exponents, 0), np.where(exact[:, None], scaled, directions)
