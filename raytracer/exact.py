@@ -43,7 +43,7 @@ class Root(NamedTuple):
             low_float, high_float = (_ratio(n * self.scale.numerator, self._denominator << bits) for n in (low, high))
             if low_float == high_float:
                 return low_float
-            bits += 64
+            bits = 2 * bits or 64
 
     @property
     def _denominator(self) -> int:

@@ -31,8 +31,8 @@ def check_fits_memory(width: int, height: int) -> None:
 
 
 def to_bytes(colours: np.ndarray) -> np.ndarray:
-    """floor(255 · clip(C, 0, 1) + ½) as uint8."""
-    return (np.clip(colours, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
+    """floor(255 · clip(C, 0, 1) + ½) as uint8; a NaN, what lies beyond float64, is black."""
+    return (np.clip(np.nan_to_num(colours), 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
 
 
 def save_png(path: str | os.PathLike[str], picture: np.ndarray) -> None:

@@ -20,6 +20,9 @@ from raytracer.units import in_units, unit_directions
 
 _CHUNK = 1 << 14  # rays that are traced together: their arrays fit a core's cache
 
+# A NaN or an infinity makes a decision uncertain, and the next level takes it.
+_NOT_A_NUMBER_IS_NO_ERROR = np.errstate(all="ignore")
+
 Index = tuple[np.ndarray, ...]
 
 
@@ -45,6 +48,7 @@ class Eye(NamedTuple):
     tests: int  # how many times a ray is tested against a sphere, in float64
 
 
+@_NOT_A_NUMBER_IS_NO_ERROR
 def open_eye(scene: Scene, raster: Raster) -> Eye:
     """Everything about the picture's spheres that does not depend on the pixel; those out of view are left out."""
     spheres = scene.spheres
@@ -55,17 +59,18 @@ def open_eye(scene: Scene, raster: Raster) -> Eye:
     left, right, top, bottom = boxes.astype(np.int64).T
     tests = int(((right - left) * (bottom - top)).sum())
     path = backend.choose(tests, len(raster.bands) * len(radii))
-    with np.errstate(all="ignore"):
-        seen = path.see(origin, centres, radii)
+    seen = path.see(origin, centres, radii)
     on = _settle_sides(origin, centres, radii, seen)
     return Eye(raster, unit, origin, order, Targets(centres, radii, on, path), seen, boxes, tests)
 
 
+@_NOT_A_NUMBER_IS_NO_ERROR
 def trace_rows(eye: Eye, rows: slice) -> Hits:
     """What the eye rays of these rows of the picture hit first: t good enough to be shaded, not to the last digit."""
     return _in_file_order(eye, _trace_rows(eye, rows))
 
 
+@_NOT_A_NUMBER_IS_NO_ERROR
 def polished_rows(eye: Eye, rows: slice) -> Hits:
     """`trace_rows`, with t to the last digit."""
     nearest = _trace_rows(eye, rows)
@@ -73,6 +78,7 @@ def polished_rows(eye: Eye, rows: slice) -> Hits:
     return _in_file_order(eye, nearest)
 
 
+@_NOT_A_NUMBER_IS_NO_ERROR
 def ray_intersect_scene(origins: np.ndarray, directions: np.ndarray, centres: np.ndarray, radii: np.ndarray) -> Hits:
     """What each of n rays hits first of s spheres: `Hits` of shape (n,), `index` counting the spheres given.
 
@@ -93,14 +99,12 @@ def ray_intersect_scene(origins: np.ndarray, directions: np.ndarray, centres: np
     for start in range(0, len(origins), _CHUNK):
         some = slice(start, start + _CHUNK)
         hits.t[some], hits.index[some] = _trace_given(origins[some], directions[some], targets)
-    with np.errstate(over="ignore", under="ignore"):
-        return Hits(np.ldexp(hits.t, unit - exponents), hits.index)
+    return Hits(np.ldexp(hits.t, unit - exponents), hits.index)
 
 
 def _trace_given(origins: np.ndarray, directions: np.ndarray, targets: Targets) -> Hits:
     nearest = Nearest.nothing_yet((len(origins),))
-    with np.errstate(all="ignore"):
-        targets.path.nearest_given(origins, given_rays(directions), targets.centres, targets.radii, nearest)
+    targets.path.nearest_given(origins, given_rays(directions), targets.centres, targets.radii, nearest)
 
     def rays_of(which: Index) -> Bundle:
         chosen = directions[which]
@@ -114,8 +118,7 @@ def _trace_given(origins: np.ndarray, directions: np.ndarray, targets: Targets) 
 def _trace_rows(eye: Eye, rows: slice) -> Nearest:
     rays = eye_rays(eye.raster, rows)
     nearest = Nearest.nothing_yet(rays.x.shape)
-    with np.errstate(all="ignore"):
-        eye.targets.path.nearest_eye(rays, eye.seen, eye.boxes, rows.start, nearest)
+    eye.targets.path.nearest_eye(rays, eye.seen, eye.boxes, rows.start, nearest)
     _settle(nearest, _pixels_of(eye, rows), eye.targets)
     return nearest
 
@@ -168,8 +171,7 @@ def _settle(nearest: Nearest, rays_of: Callable[[Index], Bundle], targets: Targe
         return
     bundle, (centres, radii, on, path) = rays_of(pending), targets
     found = Nearest.nothing_yet(pending[0].shape)
-    with np.errstate(all="ignore"):
-        path.nearest_twofold(bundle.origins, bundle.rays, centres, radii, on, found)
+    path.nearest_twofold(bundle.origins, bundle.rays, centres, radii, on, found)
     for k in np.flatnonzero(found.unsure).tolist():
         found.t[k], found.index[k] = _nearest_exactly(bundle, k, targets)
         found.error[k] = 0.0
@@ -181,11 +183,10 @@ def _nearest_exactly(bundle: Bundle, k: int, targets: Targets) -> tuple[float, i
     """Ray k against all spheres that float64 cannot rule out, in integers."""
     origin, centres, radii = bundle.origins[k], targets.centres, targets.radii
     ray = (bundle.rays.x[k], bundle.rays.y[k], bundle.rays.z[k])
-    with np.errstate(all="ignore"):
-        square = np.float64(ray[0] * ray[0] + ray[1] * ray[1] + ray[2] * ray[2])
-        seen = look(*vector(origin), *xyz(centres), radii)
-        t, error, low = meet(*seen, radii, *ray, square, bundle.rays.reach[k])
-        candidates = np.flatnonzero(contends(t, error, low, (t + error).min(), 0.0))
+    square = np.float64(ray[0] * ray[0] + ray[1] * ray[1] + ray[2] * ray[2])
+    seen = look(*vector(origin), *xyz(centres), radii)
+    t, error, low = meet(*seen, radii, *ray, square, bundle.rays.reach[k])
+    candidates = np.flatnonzero(contends(t, error, low, (t + error).min(), 0.0))
     spheres = [(centres[i].tolist(), float(radii[i])) for i in candidates]
     t_exact, index = exact.nearest_hit(vector(origin), bundle.exact_direction(k), spheres)
     return t_exact, int(candidates[index]) if index >= 0 else -1
@@ -196,8 +197,7 @@ def _polish(nearest: Nearest, rays_of: Callable[[Index], Bundle], targets: Targe
     which = np.nonzero(nearest.error > U * np.where(np.isfinite(nearest.t), nearest.t, 0))
     if which[0].size:
         bundle, (centres, radii, on, path), spheres = rays_of(which), targets, nearest.index[which]
-        with np.errstate(all="ignore"):
-            t = path.polish(bundle.origins, bundle.rays, centres[spheres], radii[spheres], on[spheres])
+        t = path.polish(bundle.origins, bundle.rays, centres[spheres], radii[spheres], on[spheres])
         nearest.t[which] = np.where(np.isfinite(t), t, nearest.t[which])
 
 

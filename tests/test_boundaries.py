@@ -1,0 +1,66 @@
+"""What may know what: checked in a fresh process, where nothing else has been imported."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parent.parent
+
+
+def in_a_fresh_process(code):
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False, timeout=120
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_importing_the_tracer_loads_neither_the_compiler_nor_java():
+    code = "import sys, raytracer; print(sorted({'numba', 'py5', 'jpype', 'PIL', 'matplotlib'} & set(sys.modules)))"
+    assert in_a_fresh_process(code) == "[]\n"
+
+
+def test_the_oracle_imports_nothing_that_it_judges():
+    code = (
+        "import sys; before = set(sys.modules); import raytracer.exact as exact; import inspect, re;"
+        "print(re.findall(r'^(?:from|import) (\\S+)', inspect.getsource(exact), re.M))"
+    )
+    found = in_a_fresh_process(code)
+    assert "raytracer" not in found
+    assert "numpy" not in found
+
+
+def test_without_numba_the_numpy_path_draws_the_same_picture():
+    code = (
+        "import sys; sys.modules['numba'] = None\n"
+        "from raytracer import interpreter, render_scene, make_plan, backend, plain\n"
+        "scene = interpreter('scenes/04_many_spheres.cli')\n"
+        "backend._spent = 1e9\n"
+        "plan = make_plan(scene)\n"
+        "assert plan.eye.targets.path is plain\n"
+        "print(plan.warnings)\n"
+        "print(render_scene(scene, width=64, height=64).tobytes().hex())\n"
+    )
+    warnings, found = in_a_fresh_process(code).splitlines()
+    assert "numba is not installed" in warnings
+    compiled = "from raytracer import *; from raytracer import backend; backend.load()\n"
+    compiled += "print(render_scene(interpreter('scenes/04_many_spheres.cli'), width=64, height=64).tobytes().hex())"
+    assert in_a_fresh_process(compiled).strip() == found
+
+
+def test_a_changed_source_does_not_run_stale_machine_code(tmp_path):
+    """numba looks at the kernel's own file only; the formulas that it compiles stand in others."""
+    code = (
+        "import shutil, sys, pathlib, subprocess\n"
+        f"copy = pathlib.Path({str(tmp_path)!r})\n"
+        "shutil.copytree('raytracer', copy / 'raytracer', ignore=shutil.ignore_patterns('__pycache__'))\n"
+        "run = [sys.executable, '-c', 'from raytracer.kernels import see; import numpy as np;"
+        "print(see(np.zeros(3), np.ones((1, 3)), np.ones(1)).c[0])']\n"
+        "first = subprocess.run(run, cwd=copy, capture_output=True, text=True).stdout\n"
+        "source = copy / 'raytracer' / 'certified.py'\n"
+        "text = source.read_text()\n"
+        "wrong = text.replace('add(square, square_low, -r2, -r2_low)', 'square, square_low')\n"
+        "source.write_text(wrong)\n"
+        "print(first.strip(), subprocess.run(run, cwd=copy, capture_output=True, text=True).stdout.strip())\n"
+    )
+    assert in_a_fresh_process(code) == "2.0 3.0\n"

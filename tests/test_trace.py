@@ -1,0 +1,211 @@
+"""What rays hit, on both paths, against exact arithmetic."""
+
+import math
+
+import mpmath
+import naive
+import numpy as np
+import pytest
+from cases import CASES
+from hypothesis import given
+from hypothesis import strategies as st
+
+import raytracer
+from raytracer import backend, exact, eye_hits, interpreter, plain, ray_intersect_scene
+from raytracer.camera import make_raster
+from raytracer.interpreter import interpret
+from raytracer.scene import Camera
+from raytracer.trace import open_eye, polished_rows
+
+PATHS = {"numpy": plain, "compiled": backend.load()}
+
+
+@pytest.fixture(params=sorted(PATHS))
+def path(request, monkeypatch):
+    """Each test that asks for it runs on the numpy path and on the compiled path."""
+    if request.param == "compiled" and not backend.has_compiler():
+        pytest.skip("numba is not installed")
+    monkeypatch.setattr(backend, "choose", lambda tests, loops: PATHS[request.param])
+    return PATHS[request.param]
+
+
+@pytest.mark.parametrize("case", CASES, ids=str)
+def test_known_cases(path, case):
+    hits = ray_intersect_scene(
+        [case.origin], [case.direction], [s[0] for s in case.spheres], [s[1] for s in case.spheres]
+    )
+    assert (hits.t[0], hits.index[0]) == (case.t, case.index)
+    assert hits.t.dtype == np.float64
+    assert hits.index.dtype == np.int32
+
+
+def assert_exact(hits, origins, directions, spheres):
+    """Every index is exact arithmetic's, every t the nearest float or its neighbour."""
+    for k, (origin, direction) in enumerate(zip(origins, directions, strict=True)):
+        t, index = exact.nearest_hit(origin, direction, spheres)
+        assert hits.index[k] == index, (k, origin, direction, spheres)
+        assert hits.t[k] == t or abs(hits.t[k] - t) <= np.spacing(t)
+
+
+SMALL = st.integers(-12, 12).map(float)
+LATTICE_POINT = st.tuples(SMALL, SMALL, SMALL)
+RAYS = st.lists(st.tuples(LATTICE_POINT, LATTICE_POINT.filter(any)), min_size=1, max_size=6)
+BALLS = st.lists(st.tuples(LATTICE_POINT, st.integers(1, 15).map(float)), min_size=1, max_size=6)
+TINY_TURN = st.integers(-3, 3)
+
+
+@given(RAYS, BALLS)
+def test_rays_of_small_integers_with_all_their_ties_and_tangents(rays, balls):
+    origins, directions = zip(*rays, strict=True)
+    centres, radii = zip(*balls, strict=True)
+    assert_exact(ray_intersect_scene(origins, directions, centres, radii), origins, directions, balls)
+
+
+@given(RAYS, BALLS, TINY_TURN, TINY_TURN, st.floats(-1e12, 1e12))
+def test_the_same_by_an_ulp_or_far_from_the_origin(rays, balls, turn, swell, shift):
+    origins = [tuple(x + shift for x in origin) for origin, _ in rays]
+    directions = [(x + turn * math.ulp(x), y, z) for _, (x, y, z) in rays]
+    balls = [(tuple(x + shift for x in centre), radius + swell * math.ulp(radius)) for centre, radius in balls]
+    centres, radii = zip(*balls, strict=True)
+    assert_exact(ray_intersect_scene(origins, directions, centres, radii), origins, directions, balls)
+
+
+ANY = st.floats(allow_nan=False, allow_infinity=False)
+ANYWHERE = st.tuples(ANY, ANY, ANY)
+
+
+@given(
+    ANYWHERE,
+    ANYWHERE.filter(any),
+    st.lists(st.tuples(ANYWHERE, st.floats(0, exclude_min=True, allow_infinity=False)), max_size=3),
+)
+def test_any_finite_numbers(origin, direction, balls):
+    centres, radii = [b[0] for b in balls], [b[1] for b in balls]
+    hits = ray_intersect_scene([origin], [direction], np.reshape(centres, (-1, 3)), radii)
+    assert hits.index[0] == exact.nearest_hit(origin, direction, balls)[1]
+
+
+def random_rays(count, spheres, seed):
+    rng = np.random.default_rng(seed)
+    centres, radii = rng.uniform(-5, 5, (spheres, 3)), rng.uniform(0.05, 0.8, spheres)
+    origins = rng.uniform(-6, 6, (count, 3))
+    return origins, rng.uniform(-1, 1, (count, 3)) * 10.0 ** rng.integers(-150, 150, (count, 1)), centres, radii
+
+
+def test_ordinary_rays(path):
+    origins, directions, centres, radii = random_rays(300, 40, seed=1)
+    hits = ray_intersect_scene(origins, directions, centres, radii)
+    assert (hits.index >= 0).sum() > 20
+    spheres = list(zip(centres.tolist(), radii.tolist(), strict=True))
+    assert_exact(hits, origins.tolist(), directions.tolist(), spheres)
+
+
+@pytest.mark.skipif(not backend.has_compiler(), reason="numba is not installed")
+def test_both_paths_find_the_same_bits(scene_path, monkeypatch):
+    scene = interpreter(scene_path)
+    found = []
+    for module in PATHS.values():
+        monkeypatch.setattr(backend, "choose", lambda tests, loops, module=module: module)
+        found.append(eye_hits(scene, 40, 30))
+    for array, other in zip(*found, strict=True):
+        np.testing.assert_array_equal(array, other)
+
+
+def test_pictures_are_exact(path, scene_path):
+    scene = interpreter(scene_path)
+    raster = make_raster(scene.camera, 64, 64)
+    hits = eye_hits(scene, 64, 64)
+    spheres = list(zip(scene.spheres.centres.tolist(), scene.spheres.radii.tolist(), strict=True))
+    pixels = np.random.default_rng(7).integers(0, 64, (max(3, min(100, 3000 // max(1, len(spheres)))), 2)).tolist()
+    for x, y in pixels:
+        t, k = exact.nearest_hit(scene.camera.eye, raster.exact_direction(x, y), spheres)
+        assert hits.index[y, x] == (scene.spheres.order[k] if k >= 0 else -1)
+        assert hits.t[y, x] == t or abs(hits.t[y, x] - t) <= np.spacing(t)
+
+
+def test_rays_that_are_tangent_in_the_course_scenes():
+    """√3 rounds down, and that much decides: 1/tan 30° in float64 arithmetic, which is larger, would hit."""
+    scene = interpret("surface 1 1 1 0 0 0 0 0 0 1 0\nsphere 1 0 0 -4")
+    assert eye_hits(scene).index[96, 128] == -1
+    wider = interpret("fov 59.99999999999999\nsurface 1 1 1 0 0 0 0 0 0 1 0\nsphere 1 0 0 -4")
+    assert eye_hits(wider).index[96, 128] == 0
+
+
+def test_index_counts_all_shapes_of_the_file():
+    triangle = "begin\nvertex 9 9 9\nvertex 9 8 9\nvertex 8 8 9\nend\n"
+    sphere = "sphere 1 0 0 -4\n"
+    scene = interpret("surface 1 1 1 0 0 0 0 0 0 1 0\n" + triangle + "sphere 1 0 0 9\n" + triangle + sphere)
+    hits = eye_hits(scene, 9, 9)
+    assert set(hits.index.ravel().tolist()) == {-1, 3}
+    assert scene.shape(3) == scene.spheres[1]
+
+
+def test_nothing_to_hit(path):
+    hits = ray_intersect_scene([[0, 0, 0]], [[0, 0, 1]], np.empty((0, 3)), [])
+    assert (hits.t[0], hits.index[0]) == (math.inf, -1)
+    assert ray_intersect_scene(np.empty((0, 3)), np.empty((0, 3)), [[0, 0, 1]], [1]).t.shape == (0,)
+    assert (eye_hits(raytracer.Scene(), 5, 4).index == np.full((4, 5), -1)).all()
+
+
+@pytest.mark.parametrize(
+    ("rays", "message"),
+    [
+        (([[0, 0, 0]], [[0, 0, 0]], [[0, 0, 1]], [1]), "directions: row 0 is zero"),
+        (([[0, 0, 0]] * 2, [[0, 0, 1], [math.nan, 0, 1]], [[0, 0, 1]], [1]), "directions: row 1 is not finite"),
+        (([[0, 0, math.inf]], [[0, 0, 1]], [[0, 0, 1]], [1]), "origins: row 0 is not finite"),
+        (([[0, 0, 0]], [[0, 0, 1]], [[0, 0, 1]], [0]), "radii: number 0 is 0.0"),
+        (([[0, 0, 0]], [[0, 0, 1]], [[0, 0, 1]], [1, 2]), "radii: found shape"),
+        (([[0, 0, 0]], [[0, 0, 1]] * 2, [[0, 0, 1]], [1]), "1 origins and 2 directions"),
+        (([0, 0, 0], [[0, 0, 1]], [[0, 0, 1]], [1]), "origins: found an array of shape"),
+    ],
+)
+def test_bad_rays_are_refused(rays, message):
+    with pytest.raises(ValueError, match=message):
+        ray_intersect_scene(*rays)
+
+
+def test_boxes_lose_no_pixel(path):
+    """Skewed frames, spheres beside and behind the eye, on a small picture: each pixel against every sphere."""
+    rng = np.random.default_rng(3)
+    for _ in range(25):
+        u, v, w = (tuple(row) for row in rng.normal(size=(3, 3)))
+        camera = Camera(tuple(rng.normal(size=3)), u, v, w, float(rng.uniform(5, 170)))
+        centres, radii = rng.normal(size=(12, 3)) * 4, rng.uniform(0.1, 2.5, 12)
+        raster = make_raster(camera, 13, 11, "centre")
+        lines = [
+            f"sphere {r!r} {x!r} {y!r} {z!r}" for r, (x, y, z) in zip(radii.tolist(), centres.tolist(), strict=True)
+        ]
+        scene = interpret("\n".join(["surface 1 1 1 0 0 0 0 0 0 1 0", *lines]))
+        eye = open_eye(raytracer.Scene(camera, spheres=scene.spheres, materials=scene.materials), raster)
+        hits = polished_rows(eye, slice(0, 11))
+        directions = [[float(x) for x in raster.exact_direction(x, y)] for y in range(11) for x in range(13)]
+        every = ray_intersect_scene([camera.eye] * 143, directions, centres, radii)
+        np.testing.assert_array_equal(hits.index.ravel(), every.index)
+
+
+def test_naive_tracer_agrees(course_scene_path):
+    """Every byte within 1 of an independent rendering, but for rays too near to tangent for it to decide."""
+    expected = naive.diffuse_picture(course_scene_path, 320, 320).astype(int)
+    found = raytracer.render_scene(interpreter(course_scene_path)).astype(int)
+    wrong = np.argwhere(np.abs(found - expected).max(axis=2) > 1)
+    assert len(wrong) <= 4
+    scene = naive.read(course_scene_path)
+    hits = eye_hits(interpreter(course_scene_path))
+    for y, x in wrong.tolist():
+        assert (hits.index[y, x] >= 0) == hit_in_many_digits(scene, x, y, 320)
+
+
+def hit_in_many_digits(scene, x, y, size):
+    with mpmath.workprec(400):
+        back = mpmath.mpf(naive.focal_length(scene["fov"][0]))
+        u, v, w = np.array(scene["uvw"], object).reshape(3, 3)
+        ray = [
+            mpmath.mpf(2 * x - size) / size * a + mpmath.mpf(size - 2 * y) / size * b - back * c
+            for a, b, c in zip(u, v, w, strict=True)
+        ]
+        for centre, radius, _ in scene["spheres"]:
+            away = [mpmath.mpf(c) - e for c, e in zip(centre, scene["eye"], strict=True)]
+            along = mpmath.fdot(away, ray)
+            if along > 0 and along**2 >= mpmath.fdot(ray, ray) * (mpmath.fdot(away, away) - mpmath.mpf(radius) ** 2):
+                return True
+    return False
