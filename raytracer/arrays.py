@@ -44,6 +44,14 @@ class TwofoldRays(NamedTuple):
     reach: np.ndarray
 
 
+class Boxed(NamedTuple):
+    """Which rays can hit which spheres at all: those whose pixel lies in the sphere's box."""
+
+    x: np.ndarray  # int32 (n,), a column for each ray
+    y: np.ndarray  # int32 (n,), a row for each ray
+    boxes: np.ndarray  # int32 (s, 4), left, right, top, bottom of each sphere, right and bottom excluded
+
+
 class Seen(NamedTuple):
     """Spheres as seen from one origin: arrays of shape (spheres,)."""
 

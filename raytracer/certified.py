@@ -60,8 +60,9 @@ DISC_ERROR_2 = 2.0**-98
 # Between these sizes of D and L, squares of squares neither overflow nor come near the subnormal numbers.
 SMALLEST, LARGEST = 1e-70, 1e70
 
-# A hit's t is good enough to be shaded when it is off by less than this part of the radius, and of itself.
-T_TOLERANCE = 2.0**-24
+# A hit's t is good enough to be shaded when its bound is less than this part of the radius, and of itself. Beyond that
+# lies a rim of a sphere's picture, which must stay narrow: what is in it goes on to the next level.
+T_TOLERANCE = 2.0**-14
 T_TOLERANCE_2 = 2.0**-60
 
 

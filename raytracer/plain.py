@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from raytracer.arrays import Nearest, Rays, Seen, TwofoldRays
+from raytracer.arrays import Boxed, Nearest, Rays, Seen, TwofoldRays
 from raytracer.certified import U, contends, look, look_twofold, meet, meet_twofold, nearer
 
 
@@ -39,7 +39,13 @@ def nearest_given(origins: np.ndarray, rays: Rays, centres: np.ndarray, radii: n
 
 
 def nearest_twofold(
-    origins: np.ndarray, rays: TwofoldRays, centres: np.ndarray, radii: np.ndarray, on: np.ndarray, nearest: Nearest
+    origins: np.ndarray,
+    rays: TwofoldRays,
+    boxed: Boxed,
+    centres: np.ndarray,
+    radii: np.ndarray,
+    on: np.ndarray,
+    nearest: Nearest,
 ) -> None:
     """Rays (n,) from origins (n, 3) against all spheres, in two-fold arithmetic where float64 does not say "behind".
 
@@ -48,15 +54,19 @@ def nearest_twofold(
     """
     t_low = np.zeros_like(nearest.t)
     x, y, z, reach = rays.x, rays.y, rays.z, rays.reach
-    in_float64 = x, y, z, x * x + y * y + z * z, reach
+    in_float64 = np.stack([x, y, z, x * x + y * y + z * z, reach])
     for i, (centre, radius) in enumerate(zip(centres, radii, strict=True)):
-        rough = meet(*look(*xyz(origins), *xyz(centre), radius), radius, *in_float64)
-        twin = (nearest.index >= 0) & (radii[nearest.index] == radius) & (centres[nearest.index] == centre).all(axis=1)
-        some = np.flatnonzero(contends(*rough, nearest.t, nearest.error) & ~twin)
+        left, right, top, bottom = boxed.boxes[i]
+        some = np.flatnonzero((left <= boxed.x) & (boxed.x < right) & (top <= boxed.y) & (boxed.y < bottom))
+        dx, dy, dz, square, m = in_float64[:, some]
+        rough = meet(*look(*xyz(origins[some]), *xyz(centre), radius), radius, dx, dy, dz, square, m)
+        best = nearest.index[some]
+        twin = (best >= 0) & (radii[best] == radius) & (centres[best] == centre).all(axis=1)
+        some = some[contends(*rough, nearest.t[some], nearest.error[some]) & ~twin]
         if some.size:
             seen = look_twofold(*xyz(origins[some]), *xyz(centre), radius, on[i])
-            best = (nearest.t[some], t_low[some], nearest.error[some], nearest.index[some], nearest.unsure[some])
-            found = nearer(*best, *meet_twofold(*seen, *TwofoldRays._make(array[some] for array in rays)), i)
+            so_far = nearest.t[some], t_low[some], nearest.error[some], nearest.index[some], nearest.unsure[some]
+            found = nearer(*so_far, *meet_twofold(*seen, *TwofoldRays._make(array[some] for array in rays)), i)
             for array, value in zip((nearest.t, t_low, *nearest[1:]), found, strict=True):
                 array[some] = value
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from raytracer import backend, exact
-from raytracer.arrays import Hits, Nearest, Seen, TwofoldRays
+from raytracer.arrays import Boxed, Hits, Nearest, Seen, TwofoldRays
 from raytracer.boxes import screen_boxes
 from raytracer.camera import Raster, eye_rays, given_rays, twofold_eye_rays, twofold_given_rays
 from raytracer.certified import U, contends, look, meet
@@ -108,7 +108,10 @@ def _trace_given(origins: np.ndarray, directions: np.ndarray, targets: Targets) 
 
     def rays_of(which: Index) -> Bundle:
         chosen = directions[which]
-        return Bundle(origins[which], twofold_given_rays(chosen), lambda k: [Fraction(x) for x in vector(chosen[k])])
+        nowhere = np.zeros(len(chosen), np.int32)  # all in one pixel, which is in every box
+        boxed = Boxed(nowhere, nowhere, np.tile(np.array([0, 1, 0, 1], np.int32), (len(targets.radii), 1)))
+        rays = twofold_given_rays(chosen)
+        return Bundle(origins[which], rays, boxed, lambda k: [Fraction(x) for x in vector(chosen[k])])
 
     _settle(nearest, rays_of, targets)
     _polish(nearest, rays_of, targets)
@@ -135,6 +138,7 @@ class Bundle(NamedTuple):
 
     origins: np.ndarray  # (n, 3)
     rays: TwofoldRays  # (n,)
+    boxed: Boxed
     exact_direction: Callable[[int], Sequence[Fraction]]  # of ray k of these
 
 
@@ -157,9 +161,9 @@ def _pixels_of(eye: Eye, rows: slice) -> Callable[[Index], Bundle]:
     def rays_of(which: Index) -> Bundle:
         ys, xs = which[0] + rows.start, which[1]
         origins = np.repeat(eye.origin[None], len(xs), axis=0)
-        return Bundle(
-            origins, twofold_eye_rays(eye.raster, xs, ys), lambda k: eye.raster.exact_direction(int(xs[k]), int(ys[k]))
-        )
+        boxed = Boxed(xs.astype(np.int32), ys.astype(np.int32), eye.boxes)
+        rays = twofold_eye_rays(eye.raster, xs, ys)
+        return Bundle(origins, rays, boxed, lambda k: eye.raster.exact_direction(int(xs[k]), int(ys[k])))
 
     return rays_of
 
@@ -171,7 +175,7 @@ def _settle(nearest: Nearest, rays_of: Callable[[Index], Bundle], targets: Targe
         return
     bundle, (centres, radii, on, path) = rays_of(pending), targets
     found = Nearest.nothing_yet(pending[0].shape)
-    path.nearest_twofold(bundle.origins, bundle.rays, centres, radii, on, found)
+    path.nearest_twofold(bundle.origins, bundle.rays, bundle.boxed, centres, radii, on, found)
     for k in np.flatnonzero(found.unsure).tolist():
         found.t[k], found.index[k] = _nearest_exactly(bundle, k, targets)
         found.error[k] = 0.0

@@ -59,7 +59,7 @@ def nearest_given(origins, rays, centres, radii, nearest):
 
 
 @compiled
-def nearest_twofold(origins, rays, centres, radii, on, nearest):
+def nearest_twofold(origins, rays, boxed, centres, radii, on, nearest):
     """`plain.nearest_twofold`."""
     best, best_error, best_index, unsure = nearest
     for k in range(len(origins)):
@@ -69,6 +69,8 @@ def nearest_twofold(origins, rays, centres, radii, on, nearest):
         square = dx * dx + dy * dy + dz * dz
         t_low = 0.0
         for i in range(len(radii)):
+            if not _inside(boxed.x[k], boxed.y[k], boxed.boxes, i):
+                continue
             cx, cy, cz = centres[i, 0], centres[i, 1], centres[i, 2]
             lx, ly, lz, c, c_error, size = look(ox, oy, oz, cx, cy, cz, radii[i])
             t, error, low = meet(lx, ly, lz, c, c_error, size, radii[i], dx, dy, dz, square, m)
@@ -98,6 +100,11 @@ def polish(origins, rays, centres, radii, on):
             rays.x[k], rays.y[k], rays.z[k], rays.x_low[k], rays.y_low[k], rays.z_low[k], rays.reach[k],
         )  # fmt: skip
     return found
+
+
+@compiled
+def _inside(x, y, boxes, i):
+    return boxes[i, 0] <= x < boxes[i, 1] and boxes[i, 2] <= y < boxes[i, 3]
 
 
 @compiled
