@@ -1,0 +1,1 @@
+"""The window: a Processing-style sketch that shows the tracer's pictures."""

@@ -1,0 +1,263 @@
+"""The window's content as an array: the picture, the status under it, and what is laid over it.
+
+Text is drawn with Pillow, so that a window's content can be made and tested without Java and without a display.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import io
+import zipfile
+from bisect import bisect_right
+from dataclasses import dataclass
+from functools import cache, lru_cache
+from pathlib import Path
+
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont
+
+from sketch.controls import KEYS, View
+from sketch.worker import Drawing
+
+SMALLEST = 320  # a smaller picture stands in the middle of a canvas of this side, so that text has room
+STRIP = 48  # the height of the status under the picture
+MARGIN = 10
+
+BACKDROP = (24, 25, 29)
+BRIGHT, DIM, AMBER = (236, 238, 242), (150, 156, 168), (255, 196, 92)
+PANEL = (18, 20, 26, 232)
+
+_LONGEST = 2000  # characters of a text
+_REACH = 5  # pixels from a marked pixel to the mark around it
+
+Colour = tuple[int, int, int]
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where things are in the window of a picture of size × size pixels."""
+
+    size: int
+
+    @property
+    def side(self) -> int:
+        return max(self.size, SMALLEST)
+
+    @property
+    def width(self) -> int:
+        return self.side
+
+    @property
+    def height(self) -> int:
+        return self.side + STRIP
+
+    @property
+    def corner(self) -> int:
+        """The picture's first column and first row in the window."""
+        return (self.side - self.size) // 2
+
+    def pixel(self, x: int, y: int) -> tuple[int, int] | None:
+        """The picture's pixel at a place of the window."""
+        column, row = x - self.corner, y - self.corner
+        return (column, row) if 0 <= column < self.size and 0 <= row < self.size else None
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A box of text over the picture: a title, and rows of which the left part may be empty."""
+
+    title: str
+    rows: tuple[tuple[str, str], ...]
+    colour: Colour = BRIGHT  # of the title
+
+
+@dataclass(frozen=True)
+class Status:
+    """The two lines under the picture; of the first, the name is shortened where there is no room."""
+
+    name: str
+    figures: str
+    remark: str
+    colour: Colour = DIM  # of the remark
+
+
+def status(view: View, drawing: Drawing | None, size: int) -> Status:
+    """What the two lines say: scene, stage, size, milliseconds; below, the answer to the last key, or warnings."""
+    current = drawing is not None and (drawing.request.path, drawing.request.stage) == (view.scene, view.stage)
+    if drawing is None or not current or not (drawing.scene or drawing.error):
+        time = "reading"
+    elif drawing.error:
+        time = "not drawn"
+    else:
+        time = f"{drawing.milliseconds:.1f} ms" if drawing.whole else f"drawing, {drawing.done:.0%}"
+    figures = f"{view.place + 1} of {len(view.scenes)} · {view.stage} · {size} × {size} · {time}"
+    if view.note:
+        return Status(view.scene.stem, figures, view.note, BRIGHT)
+    if drawing is not None and current and drawing.warnings:
+        return Status(view.scene.stem, figures, "; ".join(drawing.warnings), AMBER)
+    return Status(view.scene.stem, figures, "? shows the keys")
+
+
+def help_panel() -> Panel:
+    return Panel("Keys", (*((row.label, row.does) for row in KEYS), ("a click", "tells a pixel's story")))
+
+
+def error_panel(path: Path, error: str) -> Panel:
+    """The message about a scene that cannot be drawn; its folder is known, its name is enough."""
+    return Panel("This scene cannot be drawn", (("", error.replace(str(path), path.name)),), AMBER)
+
+
+def story_panel(lines: tuple[str, ...]) -> Panel:
+    return Panel(lines[0], tuple(("", line) for line in lines[1:]))
+
+
+def compose(
+    layout: Layout,
+    picture: np.ndarray,
+    status: Status,
+    panel: Panel | None = None,
+    mark: tuple[int, int] | None = None,
+) -> np.ndarray:
+    """The whole window: uint8 (height, width, 3). `mark` is the pixel that the panel is about."""
+    frame = np.empty((layout.height, layout.width, 3), np.uint8)
+    frame[:] = BACKDROP
+    canvas, corner = frame[: layout.side], layout.corner
+    canvas[corner : corner + layout.size, corner : corner + layout.size] = picture
+    frame[layout.side :] = _strip(layout.width, status)
+    place = None if mark is None else (mark[0] + corner, mark[1] + corner)
+    if place is not None:
+        _frame_pixel(canvas, *place)
+    if panel is not None:
+        _lay_over(canvas, panel, None if place is None else place[1])
+    return frame
+
+
+def _frame_pixel(canvas: np.ndarray, x: int, y: int) -> None:
+    """Two square lines around a pixel, white on black; the pixel itself stays seen."""
+    height, width = canvas.shape[:2]
+    columns, rows = np.arange(width), np.arange(height)
+    distance = np.maximum(abs(columns - x)[None, :], abs(rows - y)[:, None])
+    canvas[distance == _REACH] = 0
+    canvas[distance == _REACH - 1] = 255
+
+
+def _lay_over(canvas: np.ndarray, panel: Panel, row: int | None) -> None:
+    """Blend a panel into the canvas: in its middle, or above or below the row that is to stay seen."""
+    side = len(canvas)
+    room = side if row is None else max(row, side - row) - _REACH
+    text = _panel(panel, side - 2 * MARGIN, room - 2 * MARGIN)
+    height, width = text.shape[:2]
+    left, top = (side - width) // 2, (side - height) // 2
+    if row is not None:
+        top = MARGIN if row > side // 2 else side - height - MARGIN
+    under = canvas[top : top + height, left : left + width]
+    opacity = text[..., 3:] / np.float32(255)
+    under[:] = under * (1 - opacity) + text[..., :3] * opacity + 0.5
+
+
+@lru_cache(maxsize=16)
+def _strip(width: int, status: Status) -> np.ndarray:
+    """The status: two lines of text."""
+    image = Image.new("RGB", (width, STRIP), BACKDROP)
+    draw, room = ImageDraw.Draw(image), width - 2 * MARGIN
+    size = next((s for s in (15, 14, 13, 12) if _length(f"{status.name}   {status.figures}", s) <= room), 12)
+    figures = shortened(status.figures, size, room)
+    name = shortened(status.name, size, room - _length(figures, size) - MARGIN)
+    draw.text((MARGIN, 4), name, BRIGHT, font(size))
+    draw.text((width - MARGIN, 4), figures, BRIGHT, font(size), anchor="ra")
+    small = next((s for s in (14, 13) if _length(status.remark, s) <= room), 12)
+    draw.text((MARGIN, 25), shortened(status.remark, small, room), status.colour, font(small))
+    return np.asarray(image)
+
+
+@lru_cache(maxsize=16)
+def _panel(panel: Panel, width: int, height: int) -> np.ndarray:
+    """A panel in the largest type in which it fits; RGBA."""
+    for size in (16, 15, 14, 13, 12, 11, 10):
+        image = _typeset(panel, size, width)
+        if image.height <= height:
+            break
+    return np.asarray(image)[: max(height, SMALLEST // 2)]
+
+
+def _typeset(panel: Panel, size: int, room: int) -> Image.Image:
+    pad, leading = size, round(1.35 * size)
+    left = max(_length(label, size) for label, _ in panel.rows)  # labels are our own words, and short
+    left += 1.2 * size if left else 0
+    rows = [(label, wrapped(text, size, room - 2 * pad - left)) for label, text in panel.rows]
+    widest = max(_length(line, size) for _, lines in rows for line in lines)
+    width = min(room, round(2 * pad + max(left + widest, _length(panel.title, size)) + 1))
+    height = 2 * pad + leading * (1 + sum(len(lines) for _, lines in rows)) + leading // 2
+    image = Image.new("RGBA", (width, height), PANEL)
+    draw, y = ImageDraw.Draw(image), pad
+    draw.text((pad, y), shortened(panel.title, size, width - 2 * pad), panel.colour, font(size))
+    y += leading + leading // 2
+    for label, lines in rows:
+        draw.text((pad, y), label, AMBER, font(size))
+        for line in lines:
+            draw.text((pad + left, y), line, BRIGHT, font(size))
+            y += leading
+    return image
+
+
+def wrapped(text: str, size: int, room: float) -> list[str]:
+    """The text in lines that fit, broken between words, and within a word only where it is too long for a line."""
+    lines, line = [], ""
+    for word in printable(text).split(" "):
+        longer = f"{line} {word}" if line else word
+        if _length(longer, size) <= room:
+            line = longer
+            continue
+        if line:
+            lines.append(line)
+        line = word
+        while (fits := max(1, _fitting(line, size, room))) < len(line):
+            lines.append(line[:fits])
+            line = line[fits:]
+    return [*lines, line]
+
+
+def shortened(text: str, size: int, room: float) -> str:
+    """The text, cut and marked as cut where it is too long."""
+    text = printable(text)
+    if _length(text, size) <= room:
+        return text
+    fits = _fitting(text, size, room - _length("…", size))
+    return f"{text[:fits]}…" if fits else ""
+
+
+def _fitting(text: str, size: int, room: float) -> int:
+    """How many characters of a text fit."""
+    return bisect_right(range(1, len(text) + 1), room, key=lambda n: _length(text[:n], size))
+
+
+def printable(text: str) -> str:
+    """The text without what cannot be drawn, and no more of it than anybody reads: files hold anything."""
+    return "".join(character if character.isprintable() else "�" for character in text[:_LONGEST])
+
+
+def _length(text: str, size: int) -> float:
+    return float(font(size).getlength(printable(text)))
+
+
+@cache
+def font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
+    """Processing's own typeface, which py5 carries; Pillow's where py5 is not installed. A system may have none."""
+    data = _typeface()
+    return (
+        ImageFont.truetype(io.BytesIO(data), size, layout_engine=ImageFont.Layout.BASIC)
+        if data
+        else ImageFont.load_default(size)
+    )
+
+
+@cache
+def _typeface() -> bytes:
+    py5 = importlib.util.find_spec("py5")  # finds it, does not import it
+    try:
+        assert py5 is not None
+        assert py5.origin is not None
+        with zipfile.ZipFile(Path(py5.origin).parent / "jars" / "core.jar") as jar:
+            return jar.read("font/ProcessingSansPro-Regular.ttf")
+    except (AssertionError, OSError, KeyError, zipfile.BadZipFile):
+        return b""

@@ -1,0 +1,140 @@
+"""What goes on behind the window: keys and clicks change the View, the renderer follows it. No method waits."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+
+from raytracer import SceneError, interpreter, probe_pixel, render_scene
+from sketch import controls
+from sketch.controls import View
+from sketch.files import save_beside
+from sketch.overlay import Layout, Panel, compose, error_panel, help_panel, status, story_panel
+from sketch.worker import BLANK, Drawing, Renderer, Request
+
+_PATIENCE = 5.0  # seconds that the end waits for a picture to be saved
+
+
+class Session:
+    """One user looking at one folder. `changed` is called, on any thread, when `content` would be another."""
+
+    def __init__(self, view: View, size: int) -> None:
+        self.layout = Layout(size)
+        self.changed: Callable[[], object] = lambda: None
+        self._view = view
+        self._turn = threading.Lock()  # keys, clicks and chores change the view one after the other
+        self._story: tuple[tuple[int, int], tuple[str, ...]] | None = None  # of which pixel, and its lines
+        self._chores = ThreadPoolExecutor(1, "chores")  # what takes a moment and is not drawing
+        self._failure: BaseException | None = None  # of a chore
+        self._renderer = Renderer(lambda: self.changed())
+        self._renderer.post(self._request(view))
+
+    @property
+    def failure(self) -> BaseException | None:
+        """A mistake of this program, made in the background: raise it."""
+        return self._renderer.failure or self._failure
+
+    @property
+    def wants_to_quit(self) -> bool:
+        return self._view.wish == "quit"
+
+    def press(self, key: str) -> None:
+        self._change(lambda view: controls.press(view, key))
+
+    def click(self, x: int, y: int) -> None:
+        """A click at a place of the window."""
+        pixel = self.layout.pixel(x, y)
+        if pixel is not None:
+            self._change(lambda view: controls.click(view, pixel))
+
+    def content(self) -> np.ndarray:
+        """All that the window shows: uint8 (height, width, 3)."""
+        view, drawing, size = self._view, self._renderer.drawing, self.layout.size
+        picture = np.full((size, size, 3), BLANK, np.uint8) if drawing is None else drawing.picture
+        return compose(self.layout, picture, status(view, drawing, size), self._panel(view, drawing), view.pixel)
+
+    def close(self) -> None:
+        """End all work. Pictures that are being saved are finished first, unless that takes too long."""
+        self._renderer.close()
+        with suppress(TimeoutError):
+            self._chores.submit(int).result(_PATIENCE)  # a chore that does nothing, behind all others
+
+    def _change(self, step: Callable[[View], View]) -> None:
+        """Take a step to another view, and set going whatever that view wants."""
+        with self._turn:
+            before, self._view = self._view, step(self._view)
+            view = self._view
+        request = self._request(view)
+        if request != self._request(before):
+            self._renderer.post(request)
+        if view.pixel is not None and view.pixel != before.pixel:
+            self._story = None
+            self._chores.submit(self._do, lambda: self._tell(view.pixel))
+        if view.wish == "save":
+            self._chores.submit(self._do, lambda: self._save(request))
+        self.changed()
+
+    def _request(self, view: View) -> Request:
+        return Request(view.scene, view.stage, self.layout.size, view.readings)
+
+    def _panel(self, view: View, drawing: Drawing | None) -> Panel | None:
+        """What lies over the picture."""
+        if view.help:
+            return help_panel()
+        if self._story is not None and self._story[0] == view.pixel:
+            return story_panel(self._story[1])
+        if drawing is not None and drawing.error:
+            return error_panel(drawing.request.path, drawing.error)
+        return None
+
+    # Chores have a thread of their own, so that no handler waits for them.
+
+    def _do(self, chore: Callable[[], str]) -> None:
+        """Do a chore; what it returns is the answer to the key."""
+        try:
+            note = chore()
+        except (SceneError, OSError, MemoryError) as error:
+            note = str(error) or "not enough memory"
+        except BaseException as failure:
+            self._failure = failure
+            note = ""
+        if note:
+            with self._turn:
+                self._view = replace(self._view, note=note)
+        self.changed()
+
+    def _tell(self, pixel: tuple[int, int] | None) -> str:
+        """Print and show a pixel's story."""
+        drawing = self._seen()
+        if drawing is None or drawing.scene is None:
+            return "there is no picture yet"
+        if pixel is not None and pixel == self._view.pixel:  # else another click or key has come since
+            request = drawing.request
+            lines = probe_pixel(drawing.scene, *pixel, request.size, request.size, request.stage).lines()
+            self._story = pixel, tuple(lines)
+            print(*lines, sep="\n", flush=True)  # noqa: T201 (a click prints)
+        return ""
+
+    def _save(self, request: Request) -> str:
+        """Save what was seen, or on its way, when the key was pressed."""
+        latest = self._renderer.drawing
+        seen = self._seen()
+        if latest is not None and latest.error:  # the message lies over an earlier picture: that is what is seen
+            if seen is None:
+                return "not saved: there is no picture"
+            request = seen.request
+        if seen is not None and seen.whole and seen.request == request:
+            picture = seen.picture
+        else:  # not finished, or given up for the next one
+            picture = render_scene(interpreter(request.path), request.stage, request.size, request.size)
+        return f"saved {save_beside(f'{request.path.stem}-{request.stage}', picture)}"
+
+    def _seen(self) -> Drawing | None:
+        """Whose picture is seen: under the message about a broken scene, still that of the one before."""
+        latest = self._renderer.drawing
+        return self._renderer.whole if latest is not None and latest.error else latest

@@ -1,0 +1,141 @@
+"""The renderer in the background: the latest request wins, rows appear as they are drawn, errors are values."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from raytracer import Cancelled, interpreter, render_scene
+from sketch import worker
+from sketch.worker import Drawing, Renderer, Request
+
+SPHERE = "surface 1 0 0  0 0 0  0 0 0  1 0\nlight 0 5 5  1 1 1\nsphere 1 0 0 -4\n"
+SIZE = 50
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Path:
+    path = tmp_path / "scene.cli"
+    path.write_text(SPHERE)
+    return path
+
+
+@pytest.fixture
+def renderer() -> Iterator[Renderer]:
+    renderer = Renderer(lambda: None)
+    yield renderer
+    renderer.close()
+    renderer.join(10)
+
+
+def wait_until(happened: Callable[[], object]) -> None:
+    end = time.monotonic() + 10
+    while not happened():
+        assert time.monotonic() < end
+        time.sleep(0.002)
+
+
+def answer(renderer: Renderer, request: Request) -> Drawing:
+    renderer.post(request)
+    wait_until(lambda: renderer.drawing and renderer.drawing.request == request and is_over(renderer.drawing))
+    assert renderer.drawing is not None
+    return renderer.drawing
+
+
+def is_over(drawing: Drawing) -> bool:
+    return drawing.whole or bool(drawing.error)
+
+
+def test_it_draws_what_render_scene_draws(renderer, scene):
+    drawing = answer(renderer, Request(scene, "diffuse", SIZE))
+    assert np.array_equal(drawing.picture, render_scene(interpreter(scene), "diffuse", SIZE, SIZE))
+    assert drawing.milliseconds > 0
+    assert renderer.whole is drawing
+
+
+def test_an_error_is_a_value_and_leaves_the_last_picture(renderer, scene, tmp_path):
+    good = answer(renderer, Request(scene, "diffuse", SIZE))
+    bad = answer(renderer, Request(tmp_path / "missing.cli", "diffuse", SIZE))
+    assert bad.error.startswith(str(tmp_path / "missing.cli"))
+    assert "\n" not in bad.error
+    assert np.array_equal(bad.picture, good.picture)
+    assert renderer.whole is good
+    assert renderer.failure is None
+
+
+def test_a_file_is_read_again_only_when_asked(renderer, scene):
+    first = answer(renderer, Request(scene, "diffuse", SIZE))
+    scene.write_text("no scene")
+    assert answer(renderer, Request(scene, "normal", SIZE)).scene is first.scene
+    assert answer(renderer, Request(scene, "normal", SIZE, readings=1)).error
+    scene.write_text(SPHERE)
+    assert answer(renderer, Request(scene, "normal", SIZE, readings=2)).scene == first.scene
+
+
+def test_the_latest_request_wins_and_the_running_one_is_given_up(renderer, scene, monkeypatch):
+    started, given_up = threading.Event(), threading.Event()
+
+    def draw_for_ever(plan, out, progress, cancelled):
+        started.set()
+        while not cancelled():
+            time.sleep(0.001)
+        given_up.set()
+        raise Cancelled
+
+    with monkeypatch.context() as patch:
+        patch.setattr(worker, "draw", draw_for_ever)
+        renderer.post(Request(scene, "diffuse", SIZE))
+        assert started.wait(10)
+    for stage in ("hit", "outline", "normal"):
+        renderer.post(Request(scene, stage, SIZE))
+    assert given_up.wait(10)
+    wait_until(lambda: renderer.whole)
+    assert renderer.whole.request.stage == "normal"
+
+
+def test_rows_are_seen_as_they_come(scene, monkeypatch):
+    seen, drawn = [], threading.Event()
+
+    def draw_slowly(plan, out, progress, cancelled):
+        for row in range(SIZE):
+            out[row] = 7
+            time.sleep(0.004)
+            progress(row + 1, SIZE, slice(row, row + 1))
+
+    def look():
+        seen.append((renderer.drawing.done, int((renderer.drawing.picture[:, 0, 0] == 7).sum())))
+        if renderer.drawing.whole:
+            drawn.set()
+
+    monkeypatch.setattr(worker, "draw", draw_slowly)
+    renderer = Renderer(look)
+    renderer.post(Request(scene, "diffuse", SIZE))
+    assert drawn.wait(10)
+    assert len(seen) >= 3
+    assert all(rows == round(done * SIZE) for done, rows in seen)
+    assert seen[-1] == (1.0, SIZE)
+    renderer.close()
+
+
+def test_a_mistake_of_ours_is_kept_and_reported(scene, monkeypatch):
+    told = threading.Event()
+
+    def broken(*anything, **more):
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(worker, "draw", broken)
+    renderer = Renderer(told.set)
+    renderer.post(Request(scene, "diffuse", SIZE))
+    assert told.wait(10)
+    assert isinstance(renderer.failure, ZeroDivisionError)
+
+
+def test_closing_ends_the_thread(renderer):
+    renderer.close()
+    renderer.join(10)
+    assert not renderer._thread.is_alive()
