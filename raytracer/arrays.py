@@ -32,6 +32,17 @@ class Rays(NamedTuple):
     reach: np.ndarray
 
 
+class Grid(NamedTuple):
+    """The rays of some rows of a picture, D = across·u + up·v − back, in factors."""
+
+    across: np.ndarray  # float64 (width,), U of each column
+    up: np.ndarray  # float64 (rows,), V of each row
+    u: tuple[float, float, float]
+    v: tuple[float, float, float]
+    back: tuple[float, float, float]  # d·w
+    reach: np.ndarray  # float64 (rows,), at least the reach of each ray of the row
+
+
 class TwofoldRays(NamedTuple):
     """Directions in two-fold float64: each component of the true one is within 2⁻¹⁰²·reach of high + low."""
 
@@ -62,6 +73,19 @@ class Seen(NamedTuple):
     c_error: np.ndarray  # a bound of c's error; 0 where c is exactly 0
     size: np.ndarray  # √(L·L + r²)
     radius: np.ndarray
+    quick: np.ndarray  # bool: the origin is far enough outside for `certified.approach`
+
+
+class First(NamedTuple):
+    """The first sphere that each eye ray meets so far; filled in place."""
+
+    k: np.ndarray  # a·t, relative error at most `certified.K_ERROR`; +inf for none
+    index: np.ndarray  # type: ignore[assignment]  # int32, among the spheres
+    unsure: np.ndarray  # bool: the next level has to decide
+
+    @classmethod
+    def nothing_yet(cls, shape: tuple[int, ...]) -> First:
+        return cls(np.full(shape, np.inf), np.full(shape, -1, np.int32), np.zeros(shape, bool))
 
 
 class Nearest(NamedTuple):

@@ -12,16 +12,12 @@ and V likewise. Written so, the root's argument does not cancel for small sphere
 
 from __future__ import annotations
 
-from fractions import Fraction
-
 import numpy as np
 
-from raytracer.camera import Raster, focal_length
-from raytracer.scene import Camera
+from raytracer.camera import Raster, inverse_frame
 
 _PAD = 1e-9  # relative, against rounding, beside a pixel all around
 _CROSSES = 1e-6  # K₃₃ / z² below this: the sphere reaches the plane of the eye, the ellipse opens up
-_SKEWED = 1e3  # a frame whose inverse magnifies rounding by more than this gets no boxes
 
 
 def screen_boxes(raster: Raster, eye: np.ndarray, centres: np.ndarray, radii: np.ndarray) -> np.ndarray:
@@ -33,7 +29,7 @@ def screen_boxes(raster: Raster, eye: np.ndarray, centres: np.ndarray, radii: np
     """
     width, height = raster.width, raster.height
     whole = np.broadcast_to(np.array([0, width, 0, height], np.int32), (len(radii), 4))
-    n = _inverse_frame(raster.camera)
+    n = inverse_frame(raster.camera)
     if n is None:
         return np.ascontiguousarray(whole)
     with np.errstate(all="ignore"):
@@ -65,27 +61,3 @@ def _range(
     half = radii * root / k33
     half = half * (1 + _PAD) + _PAD * np.abs(middle)
     return middle - half, middle + half
-
-
-def _inverse_frame(camera: Camera) -> np.ndarray | None:
-    """The rows n₁, n₂, n₃ of (u, v, −d·w)⁻¹, or None where it would magnify rounding errors too much."""
-    back = Fraction(focal_length(camera.fov))
-    columns = [
-        [Fraction(x) for x in camera.u],
-        [Fraction(x) for x in camera.v],
-        [-back * Fraction(x) for x in camera.w],
-    ]
-    u, v, w = columns
-    crosses = [_cross(v, w), _cross(w, u), _cross(u, v)]
-    determinant = sum(a * b for a, b in zip(u, crosses[0], strict=True))
-    try:
-        rows = np.array([[float(x / determinant) for x in row] for row in crosses])
-        sizes = [np.linalg.norm([float(x) for x in column]) for column in columns]
-    except OverflowError:
-        return None
-    magnification = max(np.linalg.norm(row) * size for row, size in zip(rows, sizes, strict=True))
-    return rows if magnification < _SKEWED else None
-
-
-def _cross(a: list[Fraction], b: list[Fraction]) -> list[Fraction]:
-    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]

@@ -13,11 +13,12 @@ from __future__ import annotations
 from decimal import Decimal, localcontext
 from fractions import Fraction
 from functools import lru_cache
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
 
-from raytracer.arrays import Rays, TwofoldRays
+from raytracer.arrays import Grid, Rays, TwofoldRays
 from raytracer.certified import in_range
 from raytracer.image import check_fits_memory
 from raytracer.scene import Camera
@@ -25,7 +26,10 @@ from raytracer.twofold import Number, Twofold, add, multiply, two_product
 
 SAMPLINGS = {"corner": 0, "centre": 1}  # what is added to 2x and 2y
 
+_SKEWED = 1e3  # a frame whose inverse magnifies rounding by more than this
 _BAND_PIXELS = 1 << 15  # enough to outweigh what a task costs, few enough to stay in a core's cache
+
+Vectors = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 _PI = Decimal("3.14159265358979323846264338327950288419716939937510582097494459230781640628620899862803482534211706798")
 _DIGITS = 80
@@ -90,20 +94,27 @@ class Raster(NamedTuple):
         return dx, dy, dz
 
 
-def eye_rays(raster: Raster, rows: slice) -> Rays:
-    """The rays of whole rows of the picture, arrays of shape (rows, width).
+def eye_grid(raster: Raster, rows: slice) -> Grid:
+    """The rays of whole rows of the picture, in factors.
 
-    U is rounded once, each product once, each of the two sums once: a component is within 4u·(|U u| + |V v| + |d w|)
-    of the truth, and `reach` is the length of the vector of those three sums.
+    U is rounded once, each product once, each of the two sums once: a component of D is within
+    4u·(|U u| + |V v| + |d w|) of the truth, and `reach` is the length of the vector of those three sums.
     """
-    ys, xs = np.arange(rows.start, rows.stop)[:, None], np.arange(raster.width)[None, :]
-    across, up = (n / raster.height for n in raster.numerators(xs, ys))
-    back = focal_length(raster.camera.fov)
-    camera = raster.camera
-    axes = list(zip(camera.u, camera.v, camera.w, strict=True))
-    x, y, z = (across * u + up * v - back * w for u, v, w in axes)
-    sizes = [np.abs(across * u) + np.abs(up * v) + abs(back * w) for u, v, w in axes]
-    return Rays(x, y, z, _square(x, y, z), in_range(np.sqrt(_square(*sizes))))
+    across, _ = raster.numerators(np.arange(raster.width), 0)
+    _, up = raster.numerators(0, np.arange(rows.start, rows.stop))
+    camera, d = raster.camera, focal_length(raster.camera.fov)
+    across, up = across / raster.height, up / raster.height
+    back = (d * camera.w[0], d * camera.w[1], d * camera.w[2])
+    widest = np.abs(across).max()
+    sizes = [widest * abs(u) + np.abs(up * v) + abs(b) for u, v, b in zip(camera.u, camera.v, back, strict=True)]
+    return Grid(across, up, camera.u, camera.v, back, in_range(np.sqrt(_square(*sizes))))
+
+
+def directions(grid: Grid, rows: slice = slice(None), columns: slice = slice(None)) -> Vectors:
+    """The directions of a grid's rays, or of some of them: x, y, z, each (rows, columns)."""
+    across, up = grid.across[None, columns], grid.up[rows, None]
+    x, y, z = (across * u + up * v - back for u, v, back in zip(grid.u, grid.v, grid.back, strict=True))
+    return x, y, z
 
 
 def twofold_eye_rays(raster: Raster, xs: np.ndarray, ys: np.ndarray) -> TwofoldRays:
@@ -133,6 +144,37 @@ def twofold_given_rays(directions: np.ndarray) -> TwofoldRays:
     return TwofoldRays(x, y, z, zero, zero, zero, reach)
 
 
+@lru_cache(maxsize=64)
+def inverse_frame(camera: Camera) -> np.ndarray | None:
+    """The rows n₁, n₂, n₃ of (u, v, −d·w)⁻¹, or None where it would magnify rounding errors too much."""
+    back = Fraction(focal_length(camera.fov))
+    columns = [
+        [Fraction(x) for x in camera.u],
+        [Fraction(x) for x in camera.v],
+        [-back * Fraction(x) for x in camera.w],
+    ]
+    u, v, w = columns
+    crosses = [_cross(v, w), _cross(w, u), _cross(u, v)]
+    determinant = sum(a * b for a, b in zip(u, crosses[0], strict=True))
+    try:
+        rows = np.array([[float(x / determinant) for x in row] for row in crosses])
+        sizes = [np.linalg.norm([float(x) for x in column]) for column in columns]
+    except OverflowError:
+        return None
+    magnification = max(np.linalg.norm(row) * size for row, size in zip(rows, sizes, strict=True))
+    return rows if magnification < _SKEWED else None
+
+
+def spread(raster: Raster) -> float:
+    """κ: no ray of the picture has a reach of more than κ times its length; +inf where that is not known.
+
+    n₃·D = 1 for all of them, so |D| ≥ 1 / |n₃|.
+    """
+    n = inverse_frame(raster.camera)
+    reach = eye_grid(raster, slice(0, raster.height)).reach.max()
+    return float(reach * np.linalg.norm(n[2])) if n is not None and np.isfinite(reach) else inf
+
+
 def _square(x: Number, y: Number, z: Number) -> Number:
     return x * x + y * y + z * z
 
@@ -142,3 +184,7 @@ def _ratio(numerator: Number, denominator: float) -> Twofold:
     quotient = numerator / denominator
     product, product_low = two_product(quotient, denominator)
     return quotient, ((numerator - product) - product_low) / denominator
+
+
+def _cross(a: list[Fraction], b: list[Fraction]) -> list[Fraction]:
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]

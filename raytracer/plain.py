@@ -8,28 +8,66 @@ from __future__ import annotations
 
 import numpy as np
 
-from raytracer.arrays import Boxed, Nearest, Rays, Seen, TwofoldRays
-from raytracer.certified import U, contends, look, look_twofold, meet, meet_twofold, nearer
+from raytracer.arrays import Boxed, First, Grid, Nearest, Rays, Seen, TwofoldRays
+from raytracer.camera import directions
+from raytracer.certified import (
+    K_ERROR,
+    Three,
+    U,
+    approach,
+    arrive,
+    contends,
+    distance,
+    look,
+    look_twofold,
+    meet,
+    meet_twofold,
+    nearer,
+)
 
 
 def see(origin: np.ndarray, centres: np.ndarray, radii: np.ndarray) -> Seen:
     """All spheres, centres (s, 3) and radii (s,), as seen from one origin (3,)."""
     x, y, z, _, _, _, c, _, c_error, size = look_twofold(*xyz(origin), *xyz(centres), radii, False)
-    return Seen(x, y, z, c, U * abs(c) + c_error, size, radii)
+    return Seen(x, y, z, c, U * abs(c) + c_error, size, radii, c >= 0.25 * (size * size))
 
 
-def nearest_eye(rays: Rays, seen: Seen, boxes: np.ndarray, first_row: int, nearest: Nearest) -> None:
-    """Rays (rows, width) of one origin against the spheres seen from it, each within its box of pixels.
+def first_of_grid(grid: Grid, seen: Seen, boxes: np.ndarray, first_row: int, rim: float, first: First) -> None:
+    """What rays of one origin meet first of the spheres seen from it, each looked for in its box of pixels only.
 
-    boxes is int32 (s, 4): left, right, top, bottom, right and bottom excluded, in pixels of the whole picture; the rays
-    are those of its rows from first_row on.
+    boxes is int32 (s, 4): left, right, top, bottom, right and bottom excluded, in pixels of the whole picture; the
+    grid's rows are those from first_row on. rim is RIM · κ, or 0 if κ is not known or too large for `approach`.
     """
-    rows = len(rays.x)
     for i, (left, right, top, bottom) in enumerate(boxes.tolist()):
-        box = np.s_[max(top - first_row, 0) : min(max(bottom - first_row, 0), rows), left:right]
-        if rays.x[box].size:
-            t, error, low = meet(*Seen._make(array[i] for array in seen), *Rays._make(array[box] for array in rays))
-            _update(Nearest(*(array[box] for array in nearest)), t, error, low, i)
+        rows = slice(max(top - first_row, 0), max(min(bottom - first_row, len(grid.up)), 0))
+        if rows.start < rows.stop and left < right:
+            sphere = Seen._make(array[i] for array in seen)
+            part = First._make(array[rows, left:right] for array in first)
+            k, wins, unsure = _meet_grid(grid, rows, slice(left, right), sphere, rim, part.k)
+            part.k[...] = np.where(wins, k, part.k)
+            part.index[wins] = i
+            part.unsure[...] |= unsure
+
+
+def distances(grid: Grid, seen: Seen, first: First) -> np.ndarray:
+    """t of the first hits, +inf where there is none."""
+    hit = first.index >= 0
+    dx, dy, dz = (component[hit] for component in directions(grid))
+    lx, ly, lz, c = (array[first.index[hit]] for array in (seen.x, seen.y, seen.z, seen.c))
+    t = np.full(hit.shape, np.inf)
+    t[hit] = distance(dx * lx + dy * ly + dz * lz, dx * dx + dy * dy + dz * dz, c)
+    return t
+
+
+def _meet_grid(grid: Grid, rows: slice, columns: slice, sphere: Seen, rim: float, best: np.ndarray) -> Three:
+    dx, dy, dz = directions(grid, rows, columns)
+    lx, ly, lz, c, c_error, size, radius, quick = sphere
+    a, m = dx * dx + dy * dy + dz * dz, grid.reach[rows, None]
+    if quick and rim > 0.0:
+        h = dx * lx + dy * ly + dz * lz
+        return approach(h, a, c, m * size, rim, best)
+    t, _, low = meet(lx, ly, lz, c, c_error, size, radius, dx, dy, dz, a, m, K_ERROR / 2)
+    return arrive(t, low, a, best)
 
 
 def nearest_given(origins: np.ndarray, rays: Rays, centres: np.ndarray, radii: np.ndarray, nearest: Nearest) -> None:

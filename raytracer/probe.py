@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from raytracer.camera import eye_rays
+from raytracer.camera import directions, eye_grid
 from raytracer.image import to_bytes
 from raytracer.plan import make_plan
 from raytracer.render import draw_rows, trace_whole
@@ -58,7 +58,7 @@ def probe_pixel(
         raise ValueError(f"found pixel {x} {y}, expected one within 0 0 and {width - 1} {height - 1}")
     plan = make_plan(scene, stage, width, height, sampling)
     row = slice(y, y + 1)
-    rays, hits = eye_rays(plan.raster, row), polished_rows(plan.eye, row)
+    rays, hits = directions(eye_grid(plan.raster, row)), polished_rows(plan.eye, row)
     block = Block(scene, plan.raster, row, hits, plan.lights)
     colour = draw_rows(plan, row, trace_whole(plan) if plan.stage.needs_whole else None)[0, x]
     index, point, normal = int(hits.index[0, x]), None, None
@@ -66,7 +66,7 @@ def probe_pixel(
         k = np.count_nonzero(block.hit[0, :x])
         point, normal = vector(block.points[k]), vector(block.normals[k])
     return Pixel(
-        x, y, stage, scene.camera.eye, (float(rays.x[0, x]), float(rays.y[0, x]), float(rays.z[0, x])),
+        x, y, stage, scene.camera.eye, vector(np.array(rays)[:, 0, x]),
         index, scene.shape(index) if index >= 0 else None, float(hits.t[0, x]), point, normal,
         vector(colour), _bytes(to_bytes(colour)),
     )  # fmt: skip

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from raytracer.arrays import Hits
-from raytracer.camera import Raster, eye_rays
+from raytracer.camera import Raster, directions, eye_grid
 from raytracer.scene import Light, Scene
 
 DUMMY = (0.8, 0.2, 0.3)
@@ -47,9 +47,9 @@ class Block:
     @cached_property
     def from_eye(self) -> np.ndarray:
         """From the eye to the hit point: (hits, 3). Keeps digits that the point itself may not have."""
-        rays = eye_rays(self.raster, self.rows)
+        rays = directions(eye_grid(self.raster, self.rows))
         t = self.hits.t[self.hit]
-        return np.stack([t * rays.x[self.hit], t * rays.y[self.hit], t * rays.z[self.hit]], axis=1)
+        return np.stack([t * component[self.hit] for component in rays], axis=1)
 
     @cached_property
     def normals(self) -> np.ndarray:

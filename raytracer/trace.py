@@ -10,10 +10,17 @@ from typing import NamedTuple
 import numpy as np
 
 from raytracer import backend, exact
-from raytracer.arrays import Boxed, Hits, Nearest, Seen, TwofoldRays
+from raytracer.arrays import Boxed, First, Hits, Nearest, Seen, TwofoldRays
 from raytracer.boxes import screen_boxes
-from raytracer.camera import Raster, eye_rays, given_rays, twofold_eye_rays, twofold_given_rays
-from raytracer.certified import U, contends, look, meet
+from raytracer.camera import (
+    Raster,
+    eye_grid,
+    given_rays,
+    spread,
+    twofold_eye_rays,
+    twofold_given_rays,
+)
+from raytracer.certified import K_ERROR, LARGEST_SPREAD, RIM, U, contends, look, meet
 from raytracer.plain import xyz
 from raytracer.scene import Scene, vector
 from raytracer.units import in_units, unit_directions
@@ -45,6 +52,7 @@ class Eye(NamedTuple):
     targets: Targets  # the spheres in view
     seen: Seen
     boxes: np.ndarray  # int32 (s, 4), see `screen_boxes`
+    rim: float  # see `first_of_grid`
     tests: int  # how many times a ray is tested against a sphere, in float64
 
 
@@ -61,7 +69,9 @@ def open_eye(scene: Scene, raster: Raster) -> Eye:
     path = backend.choose(tests, len(raster.bands) * len(radii))
     seen = path.see(origin, centres, radii)
     on = _settle_sides(origin, centres, radii, seen)
-    return Eye(raster, unit, origin, order, Targets(centres, radii, on, path), seen, boxes, tests)
+    kappa = spread(raster)
+    rim = RIM * kappa if kappa <= LARGEST_SPREAD else 0.0
+    return Eye(raster, unit, origin, order, Targets(centres, radii, on, path), seen, boxes, rim, tests)
 
 
 @_NOT_A_NUMBER_IS_NO_ERROR
@@ -119,9 +129,11 @@ def _trace_given(origins: np.ndarray, directions: np.ndarray, targets: Targets) 
 
 
 def _trace_rows(eye: Eye, rows: slice) -> Nearest:
-    rays = eye_rays(eye.raster, rows)
-    nearest = Nearest.nothing_yet(rays.x.shape)
-    eye.targets.path.nearest_eye(rays, eye.seen, eye.boxes, rows.start, nearest)
+    grid = eye_grid(eye.raster, rows)
+    first = First.nothing_yet((len(grid.up), len(grid.across)))
+    eye.targets.path.first_of_grid(grid, eye.seen, eye.boxes, rows.start, eye.rim, first)
+    t = eye.targets.path.distances(grid, eye.seen, first)
+    nearest = Nearest(t, np.where(first.index >= 0, 2 * K_ERROR * t, 0.0), first.index, first.unsure)
     _settle(nearest, _pixels_of(eye, rows), eye.targets)
     return nearest
 
@@ -154,6 +166,7 @@ def _settle_sides(origin: np.ndarray, centres: np.ndarray, radii: np.ndarray, se
         if c == 0 or 1e-280 < abs(c) < 1e280:
             seen.c[i] = float(c)
             seen.c_error[i] = U * abs(float(c))
+            seen.quick[i] = False
     return on
 
 

@@ -3,6 +3,6 @@
 from raytracer.kernels.compiler import cache_named_after_sources
 
 with cache_named_after_sources():
-    from raytracer.kernels.trace import nearest_eye, nearest_given, nearest_twofold, polish, see
+    from raytracer.kernels.trace import distances, first_of_grid, nearest_given, nearest_twofold, polish, see
 
-__all__ = ["nearest_eye", "nearest_given", "nearest_twofold", "polish", "see"]
+__all__ = ["distances", "first_of_grid", "nearest_given", "nearest_twofold", "polish", "see"]
