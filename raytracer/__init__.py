@@ -11,6 +11,7 @@ The compiler (numba) is loaded when the first picture is drawn, not by this impo
 from raytracer.arrays import Hits
 from raytracer.image import PictureTooLargeError, load_png, save_png
 from raytracer.interpreter import SceneError, interpreter
+from raytracer.methods import METHODS, Method
 from raytracer.plan import Plan, make_plan
 from raytracer.probe import Pixel, probe_pixel
 from raytracer.render import Cancelled, eye_hits, render_scene
@@ -19,6 +20,7 @@ from raytracer.stages import STAGES, Block, Stage
 from raytracer.trace import ray_intersect_scene
 
 __all__ = [
+    "METHODS",
     "STAGES",
     "Block",
     "Camera",
@@ -26,6 +28,7 @@ __all__ = [
     "Hits",
     "Light",
     "Material",
+    "Method",
     "PictureTooLargeError",
     "Pixel",
     "Plan",

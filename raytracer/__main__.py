@@ -12,6 +12,7 @@ from tqdm import tqdm
 
 from raytracer import Plan, SceneError, interpreter, make_plan, save_png
 from raytracer.camera import SAMPLINGS
+from raytracer.methods import CERTIFIED, METHODS
 from raytracer.render import draw
 from raytracer.stages import STAGES
 
@@ -49,7 +50,7 @@ def explain(arguments: argparse.Namespace) -> int:
 
 def _plan(arguments: argparse.Namespace) -> Plan:
     width, height = arguments.size
-    return make_plan(interpreter(arguments.scene), arguments.stage, width, height, arguments.sampling)
+    return make_plan(interpreter(arguments.scene), arguments.stage, width, height, arguments.sampling, arguments.method)
 
 
 def size(text: str) -> tuple[int, int]:
@@ -82,6 +83,7 @@ _PICTURE = (
         ("--sampling",),
         {"choices": SAMPLINGS, "default": "corner", "help": "where in a pixel its ray goes through, default corner"},
     ),
+    Argument(("--method",), {"choices": METHODS, "default": CERTIFIED, "help": "how rays meet spheres"}),
 )
 COMMANDS: dict[str, tuple[Callable[[argparse.Namespace], int], tuple[Argument, ...]]] = {
     "render": (
@@ -102,10 +104,11 @@ COMMANDS: dict[str, tuple[Callable[[argparse.Namespace], int], tuple[Argument, .
 
 def _parser() -> argparse.ArgumentParser:
     stages = "\n".join(f"  {name:10}{stage.about}" for name, stage in STAGES.items())
+    methods = "\n".join(f"  {name:15}{method.about}" for name, method in METHODS.items())
     parser = argparse.ArgumentParser(
         prog="python -m raytracer",
         description="Draw ray-tracing scenes (.cli files) without a window.",
-        epilog=f"stages:\n{stages}\n\nexample:\n"
+        epilog=f"stages:\n{stages}\n\nmethods:\n{methods}\n\nexample:\n"
         "  python -m raytracer render scenes/04_many_spheres.cli -o spheres.png --stage normal --size 640x480",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

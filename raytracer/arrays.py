@@ -55,6 +55,10 @@ class TwofoldRays(NamedTuple):
     reach: np.ndarray
 
 
+# The directions of rays for a usual method, in its own precision: x, y, z; and, where it takes them, their low parts.
+UsualRays = tuple[tuple[np.ndarray, np.ndarray, np.ndarray], ...]
+
+
 class Boxed(NamedTuple):
     """Which rays can hit which spheres at all: those whose pixel lies in the sphere's box."""
 
@@ -73,7 +77,14 @@ class Seen(NamedTuple):
     c_error: np.ndarray  # a bound of c's error; 0 where c is exactly 0
     size: np.ndarray  # √(L·L + r²)
     radius: np.ndarray
-    quick: np.ndarray  # bool: the origin is far enough outside for `certified.approach`
+    rim: np.ndarray  # see `certified.rim_of`; 0 if `certified.approach` is not for this sphere
+
+
+class Balls(NamedTuple):
+    """Spheres as a usual method sees them, in its own precision."""
+
+    centres: np.ndarray  # (s, 3)
+    radii: np.ndarray  # (s,)
 
 
 class First(NamedTuple):

@@ -22,10 +22,10 @@ rays), so the vector one of at most 4u·m·(1 + …) in length; l² = L·L + r²
 * √disc: below (error of disc) / √disc. q: that, and twice the error of h (its sign may be wrong by that much).
 
 **Many spheres at once** (`approach`) are put in order by k = a·t = −h − √disc alone, without a division. That is for
-spheres with c ≥ l²/4, so k = a·c/q ≥ |D|·l/8; let κ ≥ m/|D| for all rays of the picture. A disc above (rim·m·l)²,
-rim = 352·2⁻²⁶·κ, then leaves k with an error of 12u·m·l from h and the roundings, and 44u·(m·l)² / (rim·m·l) from the
-root, together below (8κ·12u + 8κ·44u/rim)·k ≤ 2⁻²⁶·k, as κ ≤ 64. (44u for 40u covers c_error ≤ 2u·l².) A smaller disc
-is for the next level, unless the sphere is behind another anyway.
+spheres with c ≥ l²/64. As k = a·c/q and q ≤ 2|D|·l, k ≥ |D|·c/2l ≥ m·l / (2κ·l²/c), with κ ≥ m/|D| for all rays of the
+picture. A disc above (rim·m·l)², rim = 88·2⁻²⁶·κ·l²/c, leaves k with an error of 12u·m·l from h and the roundings, and
+of 44u·(m·l)² / (rim·m·l) from the root (44u for 40u covers c_error ≤ 2u·l²): together (24u + 88u/rim)·κ·l²/c·k at most,
+below 2⁻²⁶·k while κ ≤ 64. A smaller disc is for the next level, unless the sphere is behind another anyway.
 
 **In two-fold arithmetic** the same sums hold with u² = 2⁻¹⁰⁶ for u and constants from `twofold`: D within 16u²·m, a dot
 product 13u², so h and a within 64u² = 2⁻¹⁰⁰ of m·l and m²; c within 16u²·l²; disc within 256u² = 2⁻⁹⁸ of (m·l)².
@@ -66,10 +66,11 @@ DISC_ERROR_2 = 2.0**-98
 # Between these sizes of D and L, squares of squares neither overflow nor come near the subnormal numbers.
 SMALLEST, LARGEST = 1e-70, 1e70
 
-# The picture's rays, the quick way: k's relative error, the largest κ, and rim / κ.
+# For `approach`: k's relative error, the largest κ, the largest l²/c, and rim / κ / (l²/c).
 K_ERROR = 2.0**-26
 LARGEST_SPREAD = 64.0
-RIM = 352.0 * 2.0**-26
+NEAREST = 64.0
+RIM = 88.0 * 2.0**-26
 
 # A hit's t is good enough to be shaded when its bound is less than this part of the radius, and of itself. Beyond that
 # lies a rim of a sphere's picture, which must stay narrow: what is in it goes on to the next level.
@@ -80,6 +81,12 @@ T_TOLERANCE_2 = 2.0**-60
 def in_range(size: Number) -> Number:
     """The size, or NaN where the error bounds would not hold; NaN makes every decision uncertain."""
     return select((size > SMALLEST) & (size < LARGEST), size, np.nan)
+
+
+def rim_of(c: Number, size: Number) -> Number:
+    """rim / κ of a sphere seen from an origin, or 0 if it is not far enough outside for `approach`."""
+    square = size * size
+    return select(c * NEAREST >= square, RIM * (square / c), 0.0)
 
 
 def look(ox: Number, oy: Number, oz: Number, cx: Number, cy: Number, cz: Number, radius: Number) -> Six:
@@ -187,7 +194,7 @@ def discriminant(h: Number, h_low: Number, a: Number, a_low: Number, c: Number, 
     return add(square, square_low, -product, -product_low)
 
 
-def approach(h: Number, a: Number, c: Number, ml: Number, rim: float, best: Number) -> Three:
+def approach(h: Number, a: Number, c: Number, ml: Number, rim: Number, best: Number) -> Three:
     """For a sphere far enough outside: k = a·t, whether it comes before `best`, and whether nobody knows yet."""
     disc = h * h - a * c
     edge = (rim * rim) * (ml * ml)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from raytracer.arrays import Boxed, First, Grid, Nearest, Rays, Seen, TwofoldRays
+from raytracer.arrays import Balls, Boxed, First, Grid, Nearest, Rays, Seen, TwofoldRays, UsualRays
 from raytracer.camera import directions
 from raytracer.certified import (
     K_ERROR,
@@ -23,27 +23,30 @@ from raytracer.certified import (
     meet,
     meet_twofold,
     nearer,
+    rim_of,
 )
+from raytracer.methods import METHODS, Vector
 
 
 def see(origin: np.ndarray, centres: np.ndarray, radii: np.ndarray) -> Seen:
     """All spheres, centres (s, 3) and radii (s,), as seen from one origin (3,)."""
     x, y, z, _, _, _, c, _, c_error, size = look_twofold(*xyz(origin), *xyz(centres), radii, False)
-    return Seen(x, y, z, c, U * abs(c) + c_error, size, radii, c >= 0.25 * (size * size))
+    return Seen(x, y, z, c, U * abs(c) + c_error, size, radii, rim_of(c, size))
 
 
-def first_of_grid(grid: Grid, seen: Seen, boxes: np.ndarray, first_row: int, rim: float, first: First) -> None:
+def first_of_grid(grid: Grid, seen: Seen, boxes: np.ndarray, first_row: int, kappa: float, first: First) -> None:
     """What rays of one origin meet first of the spheres seen from it, each looked for in its box of pixels only.
 
     boxes is int32 (s, 4): left, right, top, bottom, right and bottom excluded, in pixels of the whole picture; the
-    grid's rows are those from first_row on. rim is RIM · κ, or 0 if κ is not known or too large for `approach`.
+    grid's rows are those from first_row on. kappa is κ (see `certified`), or 0 where that is not known or too large for
+    `approach`.
     """
     for i, (left, right, top, bottom) in enumerate(boxes.tolist()):
         rows = slice(max(top - first_row, 0), max(min(bottom - first_row, len(grid.up)), 0))
         if rows.start < rows.stop and left < right:
             sphere = Seen._make(array[i] for array in seen)
             part = First._make(array[rows, left:right] for array in first)
-            k, wins, unsure = _meet_grid(grid, rows, slice(left, right), sphere, rim, part.k)
+            k, wins, unsure = _meet_grid(grid, rows, slice(left, right), sphere, kappa, part.k)
             part.k[...] = np.where(wins, k, part.k)
             part.index[wins] = i
             part.unsure[...] |= unsure
@@ -59,13 +62,13 @@ def distances(grid: Grid, seen: Seen, first: First) -> np.ndarray:
     return t
 
 
-def _meet_grid(grid: Grid, rows: slice, columns: slice, sphere: Seen, rim: float, best: np.ndarray) -> Three:
+def _meet_grid(grid: Grid, rows: slice, columns: slice, sphere: Seen, kappa: float, best: np.ndarray) -> Three:
     dx, dy, dz = directions(grid, rows, columns)
-    lx, ly, lz, c, c_error, size, radius, quick = sphere
+    lx, ly, lz, c, c_error, size, radius, rim = sphere
     a, m = dx * dx + dy * dy + dz * dz, grid.reach[rows, None]
-    if quick and rim > 0.0:
+    if rim * kappa > 0.0:
         h = dx * lx + dy * ly + dz * lz
-        return approach(h, a, c, m * size, rim, best)
+        return approach(h, a, c, m * size, rim * kappa, best)
     t, _, low = meet(lx, ly, lz, c, c_error, size, radius, dx, dy, dz, a, m, K_ERROR / 2)
     return arrive(t, low, a, best)
 
@@ -107,6 +110,40 @@ def nearest_twofold(
             found = nearer(*so_far, *meet_twofold(*seen, *TwofoldRays._make(array[some] for array in rays)), i)
             for array, value in zip((nearest.t, t_low, *nearest[1:]), found, strict=True):
                 array[some] = value
+
+
+def usual_eye(
+    method: str,
+    origin: Vector,
+    rays: UsualRays,
+    spheres: Balls,
+    boxes: np.ndarray,
+    first_row: int,
+    t: np.ndarray,
+    index: np.ndarray,
+) -> None:
+    """What rays (rows, width) of one origin meet first by a usual method; boxes and rows as for `first_of_grid`."""
+    function = METHODS[method].function
+    assert function is not None
+    for i, (left, right, top, bottom) in enumerate(boxes.tolist()):
+        box = np.s_[max(top - first_row, 0) : max(min(bottom - first_row, len(t)), 0), left:right]
+        if t[box].size:
+            some = (tuple(component[box] for component in vector) for vector in rays)
+            found = function(origin, *some, xyz(spheres.centres[i]), spheres.radii[i])
+            index[box][found < t[box]] = i
+            np.minimum(t[box], found, out=t[box])
+
+
+def usual_given(
+    method: str, origins: np.ndarray, rays: UsualRays, spheres: Balls, t: np.ndarray, index: np.ndarray
+) -> None:
+    """What rays (n,) from origins (n, 3) meet first by a usual method."""
+    function = METHODS[method].function
+    assert function is not None
+    for i in range(len(spheres.radii)):
+        found = function(xyz(origins), *rays, xyz(spheres.centres[i]), spheres.radii[i])
+        index[found < t] = i
+        np.minimum(t, found, out=t)
 
 
 def polish(

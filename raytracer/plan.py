@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from raytracer import backend, plain
 from raytracer.camera import Raster, make_raster
+from raytracer.methods import CERTIFIED, METHODS, check_method
 from raytracer.scene import Light, Scene
 from raytracer.stages import STAGES, Stage
 from raytracer.trace import Eye, open_eye
@@ -26,13 +27,19 @@ class Plan:
 
 
 def make_plan(
-    scene: Scene, stage: str = "diffuse", width: int = 320, height: int = 320, sampling: str = "corner"
+    scene: Scene,
+    stage: str = "diffuse",
+    width: int = 320,
+    height: int = 320,
+    sampling: str = "corner",
+    method: str = CERTIFIED,
 ) -> Plan:
-    """The plan for a picture; ValueError for a stage, a size or a sampling that there is not."""
+    """The plan for a picture; ValueError for a stage, a size, a sampling or a method that there is not."""
     if stage not in STAGES:
         raise ValueError(f"found stage {stage!r}, expected one of {', '.join(STAGES)}")
     row, raster = STAGES[stage], make_raster(scene.camera, width, height, sampling)
-    eye = open_eye(scene, raster)
+    check_method(method)
+    eye = open_eye(scene, raster, method)
     lights = _lights_that_matter(scene) if row.needs_lights else ()
     warnings = tuple(_warnings(scene))
     return Plan(scene, row, raster, eye, lights, (*_reasons(scene, stage, row, eye, lights), *warnings), warnings)
@@ -81,7 +88,10 @@ def _reasons_for_tracing(scene: Scene, eye: Eye) -> Iterator[str]:
         yield "few tests: numpy is done before the compiler would be loaded"
     if on.any():
         yield f"the eye lies exactly on {_count(range(int(on.sum())), 'sphere')}: the hit at t = 0 does not count"
-    yield "every decision certain: float64, where that cannot tell two-fold float64, then integers"
+    if eye.method == CERTIFIED:
+        yield "every decision certain: float64, where that cannot tell two-fold float64, then integers"
+    else:
+        yield f"method {eye.method}: {METHODS[eye.method].about}; what rounding makes of it is what is drawn"
 
 
 def _warnings(scene: Scene) -> Iterator[str]:

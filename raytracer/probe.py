@@ -8,6 +8,7 @@ import numpy as np
 
 from raytracer.camera import directions, eye_grid
 from raytracer.image import to_bytes
+from raytracer.methods import CERTIFIED
 from raytracer.plan import make_plan
 from raytracer.render import draw_rows, trace_whole
 from raytracer.scene import Colour, Scene, Shape, Sphere, Vector, vector
@@ -52,11 +53,12 @@ def probe_pixel(
     height: int = 320,
     stage: str = "diffuse",
     sampling: str = "corner",
+    method: str = CERTIFIED,
 ) -> Pixel:
     """The story of the pixel in column x and row y, counted from the top left; ValueError if there is none such."""
     if not (0 <= x < width and 0 <= y < height):
         raise ValueError(f"found pixel {x} {y}, expected one within 0 0 and {width - 1} {height - 1}")
-    plan = make_plan(scene, stage, width, height, sampling)
+    plan = make_plan(scene, stage, width, height, sampling, method)
     row = slice(y, y + 1)
     rays, hits = directions(eye_grid(plan.raster, row)), polished_rows(plan.eye, row)
     block = Block(scene, plan.raster, row, hits, plan.lights)

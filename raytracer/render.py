@@ -15,6 +15,7 @@ import numpy as np
 from raytracer.arrays import Hits
 from raytracer.camera import Raster, make_raster
 from raytracer.image import to_bytes
+from raytracer.methods import CERTIFIED, check_method
 from raytracer.plan import Plan, make_plan
 from raytracer.scene import Scene
 from raytracer.stages import Block, Whole
@@ -34,6 +35,7 @@ def render_scene(
     height: int = 320,
     *,
     sampling: str = "corner",
+    method: str = CERTIFIED,
     threads: int | None = None,
     out: np.ndarray | None = None,
     progress: Progress | None = None,
@@ -43,9 +45,9 @@ def render_scene(
 
     `out` is an array of that shape to draw into. `progress(done, total, rows)` is called after each finished band of
     rows, from the calling thread; `cancelled()` before each, from the threads that draw. Raises ValueError for a stage,
-    size or sampling that there is not, `PictureTooLargeError` before anything is drawn, and `Cancelled`.
+    size, sampling or method that there is not, `PictureTooLargeError` before anything is drawn, and `Cancelled`.
     """
-    plan = make_plan(scene, stage, width, height, sampling)
+    plan = make_plan(scene, stage, width, height, sampling, method)
     return draw(plan, threads=threads, out=out, progress=progress, cancelled=cancelled)
 
 
@@ -88,7 +90,13 @@ def trace_whole(plan: Plan, threads: int | None = None, cancelled: Callable[[], 
 
 
 def eye_hits(
-    scene: Scene, width: int = 320, height: int = 320, *, sampling: str = "corner", threads: int | None = None
+    scene: Scene,
+    width: int = 320,
+    height: int = 320,
+    *,
+    sampling: str = "corner",
+    method: str = CERTIFIED,
+    threads: int | None = None,
 ) -> Hits:
     """What each pixel's eye ray hits first: t (float64, +inf for a miss) and index (int32, −1), both (height, width).
 
@@ -96,7 +104,8 @@ def eye_hits(
     the ray's direction, which is not normalised.
     """
     raster = make_raster(scene.camera, width, height, sampling)
-    eye, hits = open_eye(scene, raster), _empty_hits(raster)
+    check_method(method)
+    eye, hits = open_eye(scene, raster, method), _empty_hits(raster)
 
     def trace(rows: slice) -> None:
         hits.t[rows], hits.index[rows] = polished_rows(eye, rows)

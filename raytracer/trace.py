@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from raytracer import backend, exact
-from raytracer.arrays import Boxed, First, Hits, Nearest, Seen, TwofoldRays
+from raytracer.arrays import Balls, Boxed, First, Hits, Nearest, Seen, TwofoldRays
 from raytracer.boxes import screen_boxes
 from raytracer.camera import (
     Raster,
@@ -20,10 +20,12 @@ from raytracer.camera import (
     twofold_eye_rays,
     twofold_given_rays,
 )
-from raytracer.certified import K_ERROR, LARGEST_SPREAD, RIM, U, contends, look, meet
+from raytracer.certified import LARGEST_SPREAD, U, contends, look, meet
+from raytracer.methods import CERTIFIED, check_method
 from raytracer.plain import xyz
 from raytracer.scene import Scene, vector
 from raytracer.units import in_units, unit_directions
+from raytracer.usual import balls, usual_given, usual_rows
 
 _CHUNK = 1 << 14  # rays that are traced together: their arrays fit a core's cache
 
@@ -49,59 +51,86 @@ class Eye(NamedTuple):
     unit: int  # lengths below are counted in 2**unit of the scene's
     origin: np.ndarray  # (3,)
     order: np.ndarray  # int32 (s,), the places in the file of the spheres in view
+    all_shapes: bool  # whether these are all shapes of the file
     targets: Targets  # the spheres in view
     seen: Seen
     boxes: np.ndarray  # int32 (s, 4), see `screen_boxes`
-    rim: float  # see `first_of_grid`
+    method: str  # a row of METHODS
+    balls: Balls  # the spheres in view as that method sees them, if it is a usual one
+    kappa: float  # see `first_of_grid`
     tests: int  # how many times a ray is tested against a sphere, in float64
 
 
 @_NOT_A_NUMBER_IS_NO_ERROR
-def open_eye(scene: Scene, raster: Raster) -> Eye:
+def open_eye(scene: Scene, raster: Raster, method: str = CERTIFIED) -> Eye:
     """Everything about the picture's spheres that does not depend on the pixel; those out of view are left out."""
     spheres = scene.spheres
     unit, (origin, centres, radii) = in_units(np.array(scene.camera.eye), spheres.centres, spheres.radii)
     boxes = screen_boxes(raster, origin, centres, radii)
     in_view = (boxes[:, 1] > boxes[:, 0]) & (boxes[:, 3] > boxes[:, 2])
     order, boxes, centres, radii = spheres.order[in_view], boxes[in_view], centres[in_view], radii[in_view]
+    known = balls(method, spheres.centres[in_view], spheres.radii[in_view])
     left, right, top, bottom = boxes.astype(np.int64).T
     tests = int(((right - left) * (bottom - top)).sum())
     path = backend.choose(tests, len(raster.bands) * len(radii))
     seen = path.see(origin, centres, radii)
     on = _settle_sides(origin, centres, radii, seen)
-    kappa = spread(raster)
-    rim = RIM * kappa if kappa <= LARGEST_SPREAD else 0.0
-    return Eye(raster, unit, origin, order, Targets(centres, radii, on, path), seen, boxes, rim, tests)
+    kappa = spread(raster) if spread(raster) <= LARGEST_SPREAD else 0.0
+    return Eye(
+        raster,
+        unit,
+        origin,
+        order,
+        len(order) == len(scene),
+        Targets(centres, radii, on, path),
+        seen,
+        boxes,
+        method,
+        known,
+        kappa,
+        tests,
+    )
 
 
 @_NOT_A_NUMBER_IS_NO_ERROR
 def trace_rows(eye: Eye, rows: slice) -> Hits:
     """What the eye rays of these rows of the picture hit first: t good enough to be shaded, not to the last digit."""
+    if eye.method != CERTIFIED:
+        return _usual_rows(eye, rows)
     return _in_file_order(eye, _trace_rows(eye, rows))
 
 
 @_NOT_A_NUMBER_IS_NO_ERROR
 def polished_rows(eye: Eye, rows: slice) -> Hits:
-    """`trace_rows`, with t to the last digit."""
-    nearest = _trace_rows(eye, rows)
-    _polish(nearest, _pixels_of(eye, rows), eye.targets)
-    return _in_file_order(eye, nearest)
+    """`trace_rows`, with t to the last digit that the method gives."""
+    if eye.method != CERTIFIED:
+        return _usual_rows(eye, rows)
+    hits = _trace_rows(eye, rows)
+    _polish(hits, _pixels_of(eye, rows), eye.targets)
+    return _in_file_order(eye, hits)
 
 
 @_NOT_A_NUMBER_IS_NO_ERROR
-def ray_intersect_scene(origins: np.ndarray, directions: np.ndarray, centres: np.ndarray, radii: np.ndarray) -> Hits:
+def ray_intersect_scene(
+    origins: np.ndarray, directions: np.ndarray, centres: np.ndarray, radii: np.ndarray, method: str = CERTIFIED
+) -> Hits:
     """What each of n rays hits first of s spheres: `Hits` of shape (n,), `index` counting the spheres given.
 
     origins and directions are (n, 3), centres (s, 3), radii (s,), all finite, in one unit of length; directions need
     no normalising, t counts multiples of them. Which sphere is hit is what exact arithmetic says: only t > 0 counts, a
-    tangent ray hits, from inside the far root is the hit, and of equal t the sphere that comes first wins.
+    tangent ray hits, from inside the far root is the hit, and of equal t the sphere that comes first wins. With another
+    method of `METHODS`, it is what that method makes of it.
 
-    ValueError: a direction is zero, a number is not finite, a radius is not positive, or the shapes do not fit.
+    ValueError: there is no such method, a direction is zero, a number is not finite, a radius is not positive, or the
+    shapes do not fit.
     """
     origins, directions = _vectors("origins", origins), _vectors("directions", directions)
     centres, radii = _vectors("centres", centres), np.ascontiguousarray(radii, np.float64)
     _refuse_bad_rays(origins, directions, centres, radii)
+    check_method(method)
     path = backend.choose(len(origins) * len(radii), -(-len(origins) // _CHUNK) * len(radii))
+    if method != CERTIFIED:
+        return usual_given(method, origins, directions, centres, radii, path)
     unit, (origins, centres, radii) = in_units(origins, centres, radii)
     exponents, directions = unit_directions(directions)
     targets = Targets(centres, radii, np.zeros(len(radii), bool), path)
@@ -123,26 +152,36 @@ def _trace_given(origins: np.ndarray, directions: np.ndarray, targets: Targets) 
         rays = twofold_given_rays(chosen)
         return Bundle(origins[which], rays, boxed, lambda k: [Fraction(x) for x in vector(chosen[k])])
 
-    _settle(nearest, rays_of, targets)
-    _polish(nearest, rays_of, targets)
-    return Hits(nearest.t, nearest.index)
+    hits = Hits(nearest.t, nearest.index)
+    _settle(hits, nearest.unsure, rays_of, targets)
+    _polish(hits, rays_of, targets)
+    return hits
 
 
-def _trace_rows(eye: Eye, rows: slice) -> Nearest:
+def _usual_rows(eye: Eye, rows: slice) -> Hits:
+    t, index = usual_rows(eye.method, eye.raster, eye.balls, eye.boxes, rows, eye.targets.path)
+    return Hits(t, _places(eye, index))
+
+
+def _trace_rows(eye: Eye, rows: slice) -> Hits:
+    """Of the spheres in view, in the eye's units."""
     grid = eye_grid(eye.raster, rows)
     first = First.nothing_yet((len(grid.up), len(grid.across)))
-    eye.targets.path.first_of_grid(grid, eye.seen, eye.boxes, rows.start, eye.rim, first)
-    t = eye.targets.path.distances(grid, eye.seen, first)
-    nearest = Nearest(t, np.where(first.index >= 0, 2 * K_ERROR * t, 0.0), first.index, first.unsure)
-    _settle(nearest, _pixels_of(eye, rows), eye.targets)
-    return nearest
+    eye.targets.path.first_of_grid(grid, eye.seen, eye.boxes, rows.start, eye.kappa, first)
+    hits = Hits(eye.targets.path.distances(grid, eye.seen, first), first.index)
+    _settle(hits, first.unsure, _pixels_of(eye, rows), eye.targets)
+    return hits
 
 
-def _in_file_order(eye: Eye, nearest: Nearest) -> Hits:
-    t = np.ldexp(nearest.t, eye.unit) if eye.unit else nearest.t
-    if not len(eye.order):
-        return Hits(t, nearest.index)
-    return Hits(t, np.where(nearest.index >= 0, eye.order[nearest.index], np.int32(-1)))
+def _in_file_order(eye: Eye, hits: Hits) -> Hits:
+    return Hits(np.ldexp(hits.t, eye.unit) if eye.unit else hits.t, _places(eye, hits.index))
+
+
+def _places(eye: Eye, index: np.ndarray) -> np.ndarray:
+    """Places in the file in place of numbers of spheres in view."""
+    if eye.all_shapes:
+        return index
+    return np.where(index >= 0, eye.order[index], np.int32(-1)) if len(eye.order) else index
 
 
 class Bundle(NamedTuple):
@@ -166,7 +205,7 @@ def _settle_sides(origin: np.ndarray, centres: np.ndarray, radii: np.ndarray, se
         if c == 0 or 1e-280 < abs(c) < 1e280:
             seen.c[i] = float(c)
             seen.c_error[i] = U * abs(float(c))
-            seen.quick[i] = False
+            seen.rim[i] = 0.0
     return on
 
 
@@ -181,19 +220,17 @@ def _pixels_of(eye: Eye, rows: slice) -> Callable[[Index], Bundle]:
     return rays_of
 
 
-def _settle(nearest: Nearest, rays_of: Callable[[Index], Bundle], targets: Targets) -> None:
+def _settle(hits: Hits, unsure: np.ndarray, rays_of: Callable[[Index], Bundle], targets: Targets) -> None:
     """Decide what float64 left open: in two-fold arithmetic, and what that leaves open in integers."""
-    pending = np.nonzero(nearest.unsure)
-    if not pending[0].size:
+    if not unsure.any():
         return
+    pending = np.nonzero(unsure)
     bundle, (centres, radii, on, path) = rays_of(pending), targets
     found = Nearest.nothing_yet(pending[0].shape)
     path.nearest_twofold(bundle.origins, bundle.rays, bundle.boxed, centres, radii, on, found)
     for k in np.flatnonzero(found.unsure).tolist():
         found.t[k], found.index[k] = _nearest_exactly(bundle, k, targets)
-        found.error[k] = 0.0
-    for array, value in zip(nearest, found, strict=True):
-        array[pending] = value
+    hits.t[pending], hits.index[pending] = found.t, found.index
 
 
 def _nearest_exactly(bundle: Bundle, k: int, targets: Targets) -> tuple[float, int]:
@@ -209,13 +246,12 @@ def _nearest_exactly(bundle: Bundle, k: int, targets: Targets) -> tuple[float, i
     return t_exact, int(candidates[index]) if index >= 0 else -1
 
 
-def _polish(nearest: Nearest, rays_of: Callable[[Index], Bundle], targets: Targets) -> None:
-    """Bring the t of hits to the last digit, where its error may be larger."""
-    which = np.nonzero(nearest.error > U * np.where(np.isfinite(nearest.t), nearest.t, 0))
-    if which[0].size:
-        bundle, (centres, radii, on, path), spheres = rays_of(which), targets, nearest.index[which]
-        t = path.polish(bundle.origins, bundle.rays, centres[spheres], radii[spheres], on[spheres])
-        nearest.t[which] = np.where(np.isfinite(t), t, nearest.t[which])
+def _polish(hits: Hits, rays_of: Callable[[Index], Bundle], targets: Targets) -> None:
+    """Bring the t of hits to the last digit."""
+    which = np.nonzero(hits.index >= 0)
+    bundle, (centres, radii, on, path), spheres = rays_of(which), targets, hits.index[which]
+    t = path.polish(bundle.origins, bundle.rays, centres[spheres], radii[spheres], on[spheres])
+    hits.t[which] = np.where(np.isfinite(t), t, hits.t[which])
 
 
 def _vectors(name: str, vectors: np.ndarray) -> np.ndarray:

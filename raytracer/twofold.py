@@ -25,6 +25,16 @@ def select(condition: Number, yes: Number, no: Number) -> Number:
     return np.where(condition, yes, no)
 
 
+def exponent(x: Number) -> Number:
+    """n with 2ⁿ⁻¹ ≤ |x| < 2ⁿ."""
+    return np.frexp(x)[1]
+
+
+def scale(x: Number, n: Number) -> Number:
+    """x · 2ⁿ, exactly while it is in range."""
+    return np.ldexp(x, n)
+
+
 def two_sum(a: Number, b: Number) -> Twofold:
     """a + b without error, for any a and b (Knuth)."""
     total = a + b

@@ -10,6 +10,7 @@ at the file of a kernel only, not at the files it calls into; so the cache lies 
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -19,7 +20,7 @@ from types import FunctionType, ModuleType
 import numba
 from numba.extending import overload, register_jitable
 
-from raytracer import certified, twofold
+from raytracer import certified, methods, twofold
 
 compiled = partial(numba.njit, cache=True, nogil=True, error_model="numpy")
 
@@ -29,15 +30,26 @@ def _select(condition, yes, no):
     return lambda condition, yes, no: yes if condition else no
 
 
+@overload(twofold.exponent)
+def _exponent(x):
+    return lambda x: math.frexp(x)[1]
+
+
+@overload(twofold.scale)
+def _scale(x, n):
+    return lambda x, n: math.ldexp(x, n)
+
+
 def _compile_calls_into(module: ModuleType) -> None:
     """Let kernels call every function that this module defines."""
     for function in vars(module).values():
         own = isinstance(function, FunctionType) and function.__module__ == module.__name__
-        if own and function is not twofold.select:
+        if own and function not in _OVERLOADED:
             register_jitable(function)
 
 
-_SOURCES = (twofold, certified)
+_SOURCES = (twofold, certified, methods)
+_OVERLOADED = (twofold.select, twofold.exponent, twofold.scale)
 for _module in _SOURCES:
     _compile_calls_into(_module)
 

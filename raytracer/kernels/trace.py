@@ -16,6 +16,7 @@ from raytracer.certified import (
     meet,
     meet_twofold,
     nearer,
+    rim_of,
 )
 from raytracer.kernels.compiler import compiled
 
@@ -25,18 +26,18 @@ def see(origin, centres, radii):
     """`plain.see`."""
     n = len(radii)
     x, y, z, c, c_error, size = np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(n)
-    quick = np.empty(n, np.bool_)
+    rim = np.empty(n)
     ox, oy, oz = origin[0], origin[1], origin[2]
     for i in range(n):
         cx, cy, cz = centres[i, 0], centres[i, 1], centres[i, 2]
         x[i], y[i], z[i], _, _, _, c[i], _, error, size[i] = look_twofold(ox, oy, oz, cx, cy, cz, radii[i], False)
         c_error[i] = U * abs(c[i]) + error
-        quick[i] = c[i] >= 0.25 * (size[i] * size[i])
-    return Seen(x, y, z, c, c_error, size, radii, quick)
+        rim[i] = rim_of(c[i], size[i])
+    return Seen(x, y, z, c, c_error, size, radii, rim)
 
 
 @compiled
-def first_of_grid(grid, seen, boxes, first_row, rim, first):
+def first_of_grid(grid, seen, boxes, first_row, kappa, first):
     """`plain.first_of_grid`.
 
     The arrays of the picture are walked through flat, and counted by unsigned numbers: with a sign, an index might be
@@ -48,8 +49,8 @@ def first_of_grid(grid, seen, boxes, first_row, rim, first):
         left, right = np.uint64(boxes[i, 0]), np.uint64(boxes[i, 1])
         for y in range(max(boxes[i, 2] - first_row, 0), min(boxes[i, 3] - first_row, len(grid.up))):
             start = np.uint64(y) * width
-            if seen.quick[i] and rim > 0.0:
-                _approach_row(grid, y, seen, i, rim, left, right, start, k, index, unsure)
+            if seen.rim[i] * kappa > 0.0:
+                _approach_row(grid, y, seen, i, seen.rim[i] * kappa, left, right, start, k, index, unsure)
             else:
                 _meet_row(grid, y, seen, i, left, right, start, k, index, unsure)
 
