@@ -21,6 +21,7 @@ class Plan:
     stage: Stage
     raster: Raster
     eye: Eye
+    truth: Eye | None  # traces the true hits, for a stage that wants them
     lights: tuple[Light, ...]
     why: tuple[str, ...]  # sentences for a person: what is computed, what is not, and the reason
     warnings: tuple[str, ...]  # those that a person should see unasked
@@ -40,9 +41,12 @@ def make_plan(
     row, raster = STAGES[stage], make_raster(scene.camera, width, height, sampling)
     check_method(method)
     eye = open_eye(scene, raster, method)
+    truth = open_eye(scene, raster) if row.needs_truth else None
     lights = _lights_that_matter(scene) if row.needs_lights else ()
     warnings = tuple(_warnings(scene))
-    return Plan(scene, row, raster, eye, lights, (*_reasons(scene, stage, row, eye, lights), *warnings), warnings)
+    return Plan(
+        scene, row, raster, eye, truth, lights, (*_reasons(scene, stage, row, eye, lights), *warnings), warnings
+    )
 
 
 def _lights_that_matter(scene: Scene) -> tuple[Light, ...]:
@@ -67,6 +71,8 @@ def _reasons(scene: Scene, name: str, stage: Stage, eye: Eye, lights: tuple[Ligh
             yield f"{word} given, not used by this stage"
     if stage.needs_lights:
         yield "no shadow rays, no reflected rays: this stage has none"
+    if stage.needs_truth:
+        yield "each ray is traced twice, by the method and for the truth: this stage compares them"
     if stage.needs_whole:
         yield "the whole picture's hits are kept: this stage compares pixels with each other"
 

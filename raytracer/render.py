@@ -73,9 +73,15 @@ def draw(
 
 def draw_rows(plan: Plan, rows: slice, whole: Whole | None) -> np.ndarray:
     """The stage's colours for some rows, neither clipped nor rounded: float64 (rows, width, 3)."""
-    hits = trace_rows(plan.eye, rows) if whole is None else Hits(whole.hits.t[rows], whole.hits.index[rows])
+    truth = None
+    if whole is not None:
+        hits = Hits(whole.hits.t[rows], whole.hits.index[rows])
+    elif plan.truth is not None:
+        hits, truth = polished_rows(plan.eye, rows), polished_rows(plan.truth, rows)
+    else:
+        hits = trace_rows(plan.eye, rows)
     with np.errstate(all="ignore"):
-        return plan.stage.colours(Block(plan.scene, plan.raster, rows, hits, plan.lights, whole))
+        return plan.stage.colours(Block(plan.scene, plan.raster, rows, hits, plan.lights, whole, truth))
 
 
 def trace_whole(plan: Plan, threads: int | None = None, cancelled: Callable[[], bool] | None = None) -> Whole:

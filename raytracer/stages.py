@@ -32,6 +32,7 @@ class Block:
     hits: Hits  # of these rows: t and index, shape (rows, width)
     lights: tuple[Light, ...] = ()  # those that can be seen at all
     whole: Whole | None = None  # the hits of the whole picture, for a stage that looks beyond its rows
+    truth: Hits | None = None  # the true hits of these rows, for a stage that judges the method
 
     @cached_property
     def hit(self) -> np.ndarray:
@@ -137,6 +138,50 @@ def edges(block: Block) -> np.ndarray:
     return np.where(edge[: len(block.hits.index), :, None], BLACK, WHITE)
 
 
+def error(block: Block) -> np.ndarray:
+    """Where the method is wrong against exact arithmetic, and by how much where it is not."""
+    assert block.truth is not None
+    found, true = block.hits, block.truth
+    hit, truly_hit = found.index >= 0, true.index >= 0
+    with np.errstate(all="ignore"):
+        ulps = np.abs(found.t - true.t) / np.spacing(true.t)
+    picture = _on_scale(np.where(hit & truly_hit & np.isfinite(ulps), ulps, 0.0))
+    picture[~hit & ~truly_hit] = NOTHING
+    picture[hit & truly_hit & (found.index != true.index)] = WRONG_SHAPE
+    picture[hit & ~truly_hit] = FALSE_HIT
+    picture[~hit & truly_hit] = FALSE_MISS
+    return picture
+
+
+def _on_scale(ulps: np.ndarray) -> np.ndarray:
+    """Colours for errors, from ULPS."""
+    bits = np.log2(np.maximum(ulps, 0.5))
+    stops = np.log2([max(ulp, 0.5) for ulp, _ in ULPS])
+    return np.stack([np.interp(bits, stops, [colour[k] for _, colour in ULPS]) for k in range(3)], axis=-1)
+
+
+NOTHING = (0.13, 0.13, 0.15)
+WRONG_SHAPE, FALSE_HIT, FALSE_MISS = (1.0, 0.0, 0.0), (1.0, 0.0, 1.0), (1.0, 0.55, 0.0)
+ULPS = (
+    (0.0, (0.0, 0.12, 0.25)),
+    (1.0, (0.0, 0.25, 0.5)),
+    (2.0**10, (0.1, 0.6, 0.55)),
+    (2.0**26, (0.55, 0.85, 0.3)),
+    (2.0**52, (1.0, 1.0, 0.85)),
+)
+ERROR_LEGEND = (
+    (WRONG_SHAPE, "wrong shape"),
+    (FALSE_HIT, "hit, should miss"),
+    (FALSE_MISS, "miss, should hit"),
+    (ULPS[0][1], "t exact to the last digit"),
+    *(
+        (colour, f"t off by {ulps:.0f} ulp" if ulps < 2**10 else f"t off by 2^{int(np.log2(ulps))} ulp")
+        for ulps, colour in ULPS[1:]
+    ),
+    (NOTHING, "nothing there, rightly"),
+)
+
+
 @dataclass(frozen=True)
 class Stage:
     """One row of `STAGES`."""
@@ -147,6 +192,8 @@ class Stage:
     needs_normals: bool = False
     needs_lights: bool = False
     needs_whole: bool = False  # looks at the hits of other rows than its own
+    needs_truth: bool = False  # compares the method's hits with the true ones
+    legend: tuple[tuple[tuple[float, float, float], str], ...] = ()  # what its colours mean
 
 
 STAGES = {
@@ -156,6 +203,9 @@ STAGES = {
     "normal": Stage("n", normal, "the normal (x, y, z) as red, green, blue: −1 is 0, 1 is full", needs_normals=True),
     "depth": Stage("z", depth, "near is white, far is grey, nothing is black", needs_whole=True),
     "edges": Stage("e", edges, "the borders between different shapes", needs_whole=True),
+    "error": Stage(
+        "x", error, "where the method is wrong, against exact arithmetic", needs_truth=True, legend=ERROR_LEGEND
+    ),
 }
 
 
