@@ -20,13 +20,13 @@ Exact = float | Fraction  # a finite float64 stands for itself, exactly
 
 
 class Root(NamedTuple):
-    """The number (base + sign · √radicand) / divisor · scale, base and radicand being integers."""
+    """The number (base + sign · √radicand) · over / under, all of them integers, under above 0."""
 
     base: int
     sign: int
     radicand: int
-    divisor: int
-    scale: Fraction
+    over: int
+    under: int
 
     def is_nearer(self, other: Root) -> bool:
         """Whether this root comes before another of the same ray."""
@@ -40,14 +40,10 @@ class Root(NamedTuple):
             exact = root * root == self.radicand << 2 * bits
             low = (self.base << bits) + self.sign * root
             high = low if exact else low + self.sign
-            low_float, high_float = (_ratio(n * self.scale.numerator, self._denominator << bits) for n in (low, high))
-            if low_float == high_float:
-                return low_float
+            nearest = _ratio(low * self.over, self.under << bits)
+            if exact or nearest == _ratio(high * self.over, self.under << bits):
+                return nearest
             bits = 2 * bits or 64
-
-    @property
-    def _denominator(self) -> int:
-        return self.divisor * self.scale.denominator
 
 
 def nearest_hit(
@@ -69,12 +65,9 @@ def hits(
 ) -> list[Root | None]:
     """The smallest positive root of each sphere, or None for a miss."""
     spheres = list(spheres)
-    lengths = [*origin, *(number for centre, radius in spheres for number in (*centre, radius))]
-    integers, unit = _integers(lengths)
+    lengths, unit = _integers([*origin, *(number for centre, radius in spheres for number in (*centre, radius))])
     steps, step_unit = _integers(direction)
-    scale = unit / step_unit
-    eye = integers[:3]
-    return [_hit(eye, steps, integers[k : k + 3], integers[k + 3], scale) for k in range(3, len(integers), 4)]
+    return [_hit(lengths[:3], steps, lengths[k : k + 4], step_unit, unit) for k in range(3, len(lengths), 4)]
 
 
 def side(origin: Sequence[Exact], centre: Sequence[Exact], radius: Exact) -> Fraction:
@@ -83,9 +76,9 @@ def side(origin: Sequence[Exact], centre: Sequence[Exact], radius: Exact) -> Fra
     return sum((x * x for x in distances), Fraction(0)) - Fraction(radius) ** 2
 
 
-def _hit(eye: list[int], steps: list[int], centre: list[int], radius: int, scale: Fraction) -> Root | None:
-    dx, dy, dz = steps
-    lx, ly, lz = (e - c for e, c in zip(eye, centre, strict=True))
+def _hit(eye: list[int], steps: list[int], sphere: list[int], over: int, under: int) -> Root | None:
+    (ox, oy, oz), (dx, dy, dz), (cx, cy, cz, radius) = eye, steps, sphere
+    lx, ly, lz = ox - cx, oy - cy, oz - cz
     a = dx * dx + dy * dy + dz * dz
     x, y, z = dy * lz - dz * ly, dz * lx - dx * lz, dx * ly - dy * lx
     radicand = radius * radius * a - (x * x + y * y + z * z)
@@ -94,7 +87,7 @@ def _hit(eye: list[int], steps: list[int], centre: list[int], radius: int, scale
     middle = -(dx * lx + dy * ly + dz * lz)
     for sign in (-1, 1):
         if _sign_with_root(middle, sign, radicand) > 0:
-            return Root(middle, sign, radicand, a, scale)
+            return Root(middle, sign, radicand, over, a * under)
     return None
 
 
@@ -121,11 +114,11 @@ def _sign(number: int) -> int:
     return (number > 0) - (number < 0)
 
 
-def _integers(numbers: Iterable[Exact]) -> tuple[list[int], Fraction]:
-    """Integers, and the unit that they count: numbers = integers · unit."""
+def _integers(numbers: Iterable[Exact]) -> tuple[list[int], int]:
+    """Integers, and how many of them make 1: numbers = integers / that."""
     ratios = [number.as_integer_ratio() for number in numbers]
-    denominator = lcm(*(d for _, d in ratios))
-    return [n * (denominator // d) for n, d in ratios], Fraction(1, denominator)
+    whole = lcm(*[d for _, d in ratios])
+    return [n * (whole // d) for n, d in ratios], whole
 
 
 def _ratio(numerator: int, denominator: int) -> float:
