@@ -11,7 +11,7 @@ L = O − C, a = D·D, h = D·L, c = L·L − r², as everywhere.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -182,15 +182,26 @@ def minus_multiple(x: Number, x_low: Number, s: Number, s_low: Number, d: Number
 
 
 @dataclass(frozen=True)
+class Limits:
+    """Powers of ten up to which a method is right, and well above which it is seen to fail. None: no such limit.
+
+    Right is: hits and misses are, but within a hundredth of the radius of tangent, and t is to a thousandth.
+    """
+
+    far: float | None = None  # distance / radius
+    ground: float | None = None  # radius / height above the sphere
+    size: float | None = None  # of all lengths, both up and down
+    apart: float | None = None  # two hits, by what part of the radius: the limit is the power of its inverse
+
+
+@dataclass(frozen=True)
 class Method:
-    """One row of `METHODS`. A limit is a power of ten: up to it the method is right, well above it is seen to fail."""
+    """One row of `METHODS`."""
 
     function: Callable[..., Number] | None  # None: it has a tracer of its own
     about: str
     source: str
-    far: float | None = None  # distance / radius
-    ground: float | None = None  # radius / height above the sphere
-    size: float | None = None  # of all lengths: squares stay in range from 10⁻ˢⁱᶻᵉ to 10ˢⁱᶻᵉ
+    limits: Limits
     precision: type[np.floating] = np.float64
     twofold: bool = False  # the function takes the direction's low parts too
 
@@ -207,24 +218,27 @@ _OGITA = "T. Ogita, S. Rump, S. Oishi, Accurate Sum and Dot Product, 2005"
 _JOLDES = "M. Joldes, J.-M. Muller, V. Popescu, ACM TOMS 44, 2017"
 _SINGLE = np.float32
 
+_DOUBLE = Limits(far=6, ground=11, size=140, apart=13)
+_FLOAT = Limits(far=2, ground=3, size=16, apart=4.5)
+
 CERTIFIED = "certified"
 
 METHODS = {
-    CERTIFIED: Method(None, "float64 with a bound of its error, two-fold float64, integers", "certified.py"),
-    "textbook": Method(textbook, "the guide's −b ± √(b² − 4ac)", _TEXTBOOK, far=6, ground=5, size=75),
-    "half_b": Method(half_b, "−h ± √(h² − ac)", _SHIRLEY, far=6, ground=5, size=75),
-    "geometric": Method(geometric, "the centre projected onto the ray", _GLASSNER, far=6, ground=5, size=140),
-    "stable": Method(stable, "half_b, but q / a and c / q for the roots", _RECIPES, far=6, ground=5, size=75),
-    "kahan": Method(kahan, "stable, h² − ac from exact products", _KAHAN, far=6, ground=5, size=75),
-    "haines": Method(haines, "stable, r² minus the squared distance from the ray", _HAINES, far=12, ground=5, size=140),
-    "compensated": Method(compensated, "haines, O − C without error, c and h two-fold", _OGITA, far=25, ground=25),
-    "double_double": Method(double_double, "stable in two-fold float64", _JOLDES, far=13, ground=25, twofold=True),
-    "textbook32": Method(textbook, "textbook in float32", _TEXTBOOK, far=2, ground=2, size=9, precision=_SINGLE),
-    "half_b32": Method(half_b, "half_b in float32", _SHIRLEY, far=2, ground=2, size=9, precision=_SINGLE),
-    "geometric32": Method(geometric, "geometric in float32", _GLASSNER, far=2, ground=2, size=16, precision=_SINGLE),
-    "stable32": Method(stable, "stable in float32", _RECIPES, far=2, ground=2, size=9, precision=_SINGLE),
-    "haines32": Method(haines, "haines in float32", _HAINES, far=5, ground=2, size=16, precision=_SINGLE),
-}  # fmt: skip
+    CERTIFIED: Method(None, "float64 with a bound of its error, two-fold float64, integers", "certified.py", Limits()),
+    "textbook": Method(textbook, "the guide's −b ± √(b² − 4ac)", _TEXTBOOK, _DOUBLE),
+    "half_b": Method(half_b, "−h ± √(h² − ac)", _SHIRLEY, _DOUBLE),
+    "geometric": Method(geometric, "the centre projected onto the ray", _GLASSNER, _DOUBLE),
+    "stable": Method(stable, "half_b, but q / a and c / q for the roots", _RECIPES, _DOUBLE),
+    "kahan": Method(kahan, "stable, h² − ac from exact products", _KAHAN, _DOUBLE),
+    "haines": Method(haines, "stable, r² minus the squared distance from the ray", _HAINES, replace(_DOUBLE, far=13)),
+    "compensated": Method(compensated, "haines, O − C without error, c and h two-fold", _OGITA, Limits(apart=13)),
+    "double_double": Method(double_double, "stable in two-fold float64", _JOLDES, Limits(apart=14), twofold=True),
+    "textbook32": Method(textbook, "textbook in float32", _TEXTBOOK, _FLOAT, _SINGLE),
+    "half_b32": Method(half_b, "half_b in float32", _SHIRLEY, _FLOAT, _SINGLE),
+    "geometric32": Method(geometric, "geometric in float32", _GLASSNER, _FLOAT, _SINGLE),
+    "stable32": Method(stable, "stable in float32", _RECIPES, _FLOAT, _SINGLE),
+    "haines32": Method(haines, "haines in float32", _HAINES, replace(_FLOAT, far=5), _SINGLE),
+}
 
 
 def check_method(name: str) -> None:
