@@ -12,6 +12,7 @@ from tqdm import tqdm
 
 from raytracer import Plan, SceneError, interpreter, make_plan, save_png
 from raytracer.camera import SAMPLINGS
+from raytracer.image import check_can_save
 from raytracer.methods import CERTIFIED, METHODS
 from raytracer.render import draw
 from raytracer.stages import STAGES
@@ -19,13 +20,17 @@ from raytracer.stages import STAGES
 
 def render(arguments: argparse.Namespace) -> int:
     """Draw a scene into a PNG file."""
+    check_can_save(arguments.output)
     plan = _plan(arguments)
     for warning in plan.warnings:
         print(f"{arguments.scene}: {warning}", file=sys.stderr)
-    with tqdm(total=plan.raster.height, unit=" rows", delay=1, leave=False, disable=None) as bar:
-        picture = draw(
-            plan, threads=arguments.threads, progress=lambda done, total, rows: bar.update(rows.stop - rows.start)
-        )
+    with tqdm(unit=" bands", delay=1, leave=False, disable=None) as bar:
+
+        def show(done: int, total: int, rows: slice) -> None:
+            bar.total = total
+            bar.update(1)
+
+        picture = draw(plan, threads=arguments.threads, progress=show)
     save_png(arguments.output, picture)
     return 0
 
@@ -48,6 +53,19 @@ def explain(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def verify(arguments: argparse.Namespace) -> int:
+    """Compare a method with exact arithmetic on rays of every family."""
+    from raytracer.families import FAMILIES
+    from raytracer.verify import verify as verify_family
+
+    status = 0
+    for family in FAMILIES:
+        verdict = verify_family(family, arguments.method, arguments.rays, arguments.seed)
+        print(f"{family:20}{verdict}", flush=True)
+        status |= verdict.wrong > 0
+    return status
+
+
 def _plan(arguments: argparse.Namespace) -> Plan:
     width, height = arguments.size
     return make_plan(interpreter(arguments.scene), arguments.stage, width, height, arguments.sampling, arguments.method)
@@ -62,9 +80,9 @@ def size(text: str) -> tuple[int, int]:
         raise argparse.ArgumentTypeError(f"found {text!r}, expected WIDTHxHEIGHT, such as 640x480") from None
 
 
-def threads(text: str) -> int:
+def count(text: str) -> int:
     if not (text.isdecimal() and int(text) >= 1):
-        raise argparse.ArgumentTypeError(f"found {text!r}, expected a number of threads, 1 or more")
+        raise argparse.ArgumentTypeError(f"found {text!r}, expected a whole number, 1 or more")
     return int(text)
 
 
@@ -76,6 +94,9 @@ class Argument(NamedTuple):
 
 
 _SCENE = Argument(("scene",), {"metavar": "SCENE", "type": Path, "help": "a .cli file"})
+_METHOD = Argument(
+    ("--method",), {"choices": METHODS, "default": CERTIFIED, "help": "how rays meet spheres, default certified"}
+)
 _PICTURE = (
     Argument(("--stage",), {"choices": STAGES, "default": "diffuse", "help": "what is drawn; the default is diffuse"}),
     Argument(("--size",), {"metavar": "WxH", "type": size, "default": (320, 320), "help": "pixels, default 320x320"}),
@@ -83,7 +104,7 @@ _PICTURE = (
         ("--sampling",),
         {"choices": SAMPLINGS, "default": "corner", "help": "where in a pixel its ray goes through, default corner"},
     ),
-    Argument(("--method",), {"choices": METHODS, "default": CERTIFIED, "help": "how rays meet spheres"}),
+    _METHOD,
 )
 COMMANDS: dict[str, tuple[Callable[[argparse.Namespace], int], tuple[Argument, ...]]] = {
     "render": (
@@ -94,11 +115,21 @@ COMMANDS: dict[str, tuple[Callable[[argparse.Namespace], int], tuple[Argument, .
                 ("-o", "--output"), {"metavar": "OUT.png", "type": Path, "required": True, "help": "the file to write"}
             ),
             *_PICTURE,
-            Argument(("--threads",), {"metavar": "N", "type": threads, "help": "default: as many as there are cores"}),
+            Argument(("--threads",), {"metavar": "N", "type": count, "help": "default: as many as there are cores"}),
         ),
     ),
     "check": (check, (Argument(("scenes",), {"metavar": "SCENE", "type": Path, "nargs": "+", "help": ".cli files"}),)),
     "explain": (explain, (_SCENE, *_PICTURE)),
+    "verify": (
+        verify,
+        (
+            _METHOD,
+            Argument(
+                ("--rays",), {"metavar": "N", "type": count, "default": 10_000, "help": "a family, default 10000"}
+            ),
+            Argument(("--seed",), {"metavar": "S", "type": int, "default": 1, "help": "of the random rays, default 1"}),
+        ),
+    ),
 }
 
 

@@ -19,19 +19,23 @@ _SECONDS_A_TEST, _SECONDS_A_LOOP = 1e-7, 3e-4  # numpy: a ray against a sphere; 
 _lock = Lock()
 _loaded: ModuleType | None = None
 _spent = 0.0
+_fault = ""
 
 
-def has_compiler() -> bool:
-    """Whether numba is installed."""
-    return find_spec("numba") is not None
+def why_no_compiler() -> str:
+    """What keeps the kernels from being compiled, in a few words; nothing if all is there, as far as is known."""
+    return _fault or ("" if find_spec("numba") else "numba is not installed")
 
 
 def load() -> ModuleType:
-    """The compiled path, loaded if it was not; the numpy path where numba is not installed."""
-    global _loaded
+    """The compiled path, loaded if it was not; the numpy path where the compiler cannot be loaded."""
+    global _loaded, _fault
     with _lock:
         if _loaded is None:
-            _loaded = _import_kernels() if has_compiler() else plain
+            try:
+                _loaded = _import_kernels()
+            except ImportError as error:
+                _loaded, _fault = plain, why_no_compiler() or f"numba cannot be loaded ({error})"
         return _loaded
 
 
@@ -39,10 +43,11 @@ def choose(tests: int, loops: int) -> ModuleType:
     """The path for so many tests of a ray against a sphere, in so many loops over rays."""
     global _spent
     seconds = tests * _SECONDS_A_TEST + loops * _SECONDS_A_LOOP
-    if _loaded is not None or _spent + seconds > _PRICE:
-        return load()
-    _spent += seconds
-    return plain
+    with _lock:
+        rent = _loaded is None and _spent + seconds <= _PRICE
+        if rent:
+            _spent += seconds
+    return plain if rent else load()
 
 
 def _import_kernels() -> ModuleType:

@@ -14,6 +14,7 @@ from decimal import Decimal, localcontext
 from fractions import Fraction
 from functools import lru_cache
 from math import inf
+from operator import index
 from typing import NamedTuple
 
 import numpy as np
@@ -26,8 +27,10 @@ from raytracer.twofold import Number, Twofold, add, multiply, two_product
 
 SAMPLINGS = {"corner": 0, "centre": 1}  # what is added to 2x and 2y
 
+_LARGEST_SIDE = (1 << 31) - 1
 _SKEWED = 1e3  # a frame whose inverse magnifies rounding by more than this
-_BAND_PIXELS = 1 << 15  # enough to outweigh what a task costs, few enough to stay in a core's cache
+_BAND_TESTS = 1 << 22
+BAND_PIXELS = 1 << 15  # enough to outweigh what a task costs, few enough to stay in a core's cache
 
 Vectors = tuple[np.ndarray, np.ndarray, np.ndarray]
 
@@ -57,12 +60,27 @@ def _power_series(x: Decimal, first: int) -> Decimal:
 
 def make_raster(camera: Camera, width: int, height: int, sampling: str = "corner") -> Raster:
     """The rays of a picture; ValueError for a size or a sampling that there is not, or `PictureTooLargeError`."""
+    width, height = index(width), index(height)
     if width < 1 or height < 1:
         raise ValueError(f"a picture of {width} x {height} pixels has nothing to show; expected at least 1 x 1")
+    if max(width, height) > _LARGEST_SIDE:
+        raise ValueError(f"found a side of more than {_LARGEST_SIDE} pixels, expected a smaller picture")
     if sampling not in SAMPLINGS:
         raise ValueError(f"found sampling {sampling!r}, expected one of {', '.join(SAMPLINGS)}")
-    check_fits_memory(width, height)
+    _check_camera(camera)
+    check_fits_memory(width, height, max(width, BAND_PIXELS))
     return Raster(camera, width, height, sampling)
+
+
+def _check_camera(camera: Camera) -> None:
+    """What the interpreter refuses in a file, for cameras that come from elsewhere."""
+    if not (0 < camera.fov < 180 and focal_length(camera.fov) < inf):
+        raise ValueError(f"found fov {camera.fov}, expected an angle in degrees above 0 and below 180")
+    if not np.isfinite([camera.eye, camera.u, camera.v, camera.w]).all():
+        raise ValueError("found a camera with a number that is not finite")
+    u, v, w = ([Fraction(x) for x in axis] for axis in (camera.u, camera.v, camera.w))
+    if not sum(a * b for a, b in zip(u, _cross(v, w), strict=True)):
+        raise ValueError("found dependent vectors u, v, w in a camera, expected three that point out of one plane")
 
 
 class Raster(NamedTuple):
@@ -73,10 +91,10 @@ class Raster(NamedTuple):
     height: int
     sampling: str = "corner"
 
-    @property
-    def bands(self) -> list[slice]:
-        """The picture's rows, cut into pieces that are drawn one at a time."""
-        rows = max(1, _BAND_PIXELS // self.width)
+    def bands(self, tests_a_pixel: float = 0.0) -> list[slice]:
+        """The picture's rows, cut into pieces that are traced one at a time; none takes long."""
+        pixels = min(BAND_PIXELS, _BAND_TESTS / max(tests_a_pixel, 1.0))
+        rows = max(1, int(pixels) // self.width)
         return [slice(start, min(start + rows, self.height)) for start in range(0, self.height, rows)]
 
     def numerators(self, xs: Number, ys: Number) -> tuple[Number, Number]:

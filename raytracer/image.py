@@ -4,20 +4,26 @@ from __future__ import annotations
 
 import errno
 import os
+import secrets
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 
 _BYTES_A_PIXEL = 24  # the picture, the hits of all pixels, and room for a PNG encoder
+_BYTES_AT_WORK = 200  # for each pixel that a thread is at work on
 
 
 class PictureTooLargeError(MemoryError):
     """A picture that this machine's memory does not hold."""
 
 
-def check_fits_memory(width: int, height: int) -> None:
-    """Raise `PictureTooLargeError` now, with the figures, rather than run out of memory later."""
-    needed = width * height * _BYTES_A_PIXEL
+def check_fits_memory(width: int, height: int, at_work: int) -> None:
+    """Raise `PictureTooLargeError` now, with the figures, rather than run out of memory later.
+
+    `at_work` is how many pixels each thread works on at a time.
+    """
+    needed = width * height * _BYTES_A_PIXEL + (os.cpu_count() or 1) * at_work * _BYTES_AT_WORK
     if needed < 1 << 28:
         return
     import psutil  # slow to load, and rarely needed
@@ -35,24 +41,50 @@ def to_bytes(colours: np.ndarray) -> np.ndarray:
     return (np.clip(np.nan_to_num(colours), 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
 
 
-def save_png(path: str | os.PathLike[str], picture: np.ndarray) -> None:
-    """Write uint8 (height, width, 3) as a PNG, whole or not at all: an existing file stays until the new one stands."""
-    from PIL import Image  # slow to load, and not needed to draw
-
-    path = Path(path)
+def check_can_save(path: str | os.PathLike[str]) -> None:
+    """Raise the `OSError` that saving there would end in, as far as can be known before."""
+    path = Path(path).resolve()
     if not path.parent.is_dir():
         raise FileNotFoundError(errno.ENOENT, "no such folder", str(path.parent))
     if path.is_dir():
         raise IsADirectoryError(errno.EISDIR, "a folder, expected a file to write", str(path))
-    draft = path.with_name(f".{path.name}.{os.getpid()}.part")
+    if not os.access(path if path.exists() else path.parent, os.W_OK):
+        raise PermissionError(errno.EACCES, "may not be written", str(path))
+
+
+def save_png(path: str | os.PathLike[str], picture: np.ndarray) -> None:
+    """Write uint8 (height, width, 3) as a PNG, whole or not at all: an existing file stays until the new one stands.
+
+    A link is followed, a pipe or device written to as it is. Raises `OSError`.
+    """
+    check_can_save(path)
+    path = Path(path).resolve()
+    try:
+        if path.exists() and not path.is_file():
+            with path.open("wb") as file:
+                _encode(picture, file)
+        else:
+            _replace(path, picture)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from error
+
+
+def _replace(path: Path, picture: np.ndarray) -> None:
+    draft = path.with_name(f".{secrets.token_hex(8)}.part")
     try:
         with draft.open("xb") as file:
-            Image.fromarray(picture).save(file, "PNG")
+            _encode(picture, file)
             file.flush()
             os.fsync(file.fileno())
         draft.replace(path)
     finally:
         draft.unlink(missing_ok=True)
+
+
+def _encode(picture: np.ndarray, file: IO[bytes]) -> None:
+    from PIL import Image  # slow to load, and not needed to draw
+
+    Image.fromarray(picture).save(file, "PNG")
 
 
 def load_png(path: str | os.PathLike[str]) -> np.ndarray:

@@ -282,7 +282,7 @@ def _interpret(file: BinaryIO, path: Path) -> Scene:
     number = 1
     for block in _blocks(file, path):
         lines = block.count(b"\n")
-        if not _read_plain(draft, block, lines):
+        if not _read_plain(draft, block):
             _read_lines(draft, block, number, path)
         number += lines
     if draft.vertices is not None:
@@ -375,17 +375,20 @@ def _number(word: str, k: int) -> float:
 _PLAIN = b"0123456789+-.eE \n" + b"sphere" + b"surface"
 
 
-def _read_plain(draft: _Draft, block: bytes, lines: int) -> bool:
+def _read_plain(draft: _Draft, block: bytes) -> bool:
     """Reads a block of nothing but faultless `sphere` and `surface` lines at one go, and says whether it was one.
 
     What it reads is exactly what `_read_lines` would. Where it is in any doubt, it leaves block and draft alone.
     """
-    values = _plain_values(block, lines)
-    if values is None or draft.vertices is not None:
+    lines = _bare_lines(block)
+    if lines is None or draft.vertices is not None:
+        return False
+    values, commands = _plain_values(lines), lines.count(b"\n")
+    if values is None:
         return False
     starts = np.flatnonzero(~np.isfinite(values))
     is_sphere = np.isnan(values[starts])
-    if len(starts) != lines or np.any(np.diff(starts, append=len(values)) != np.where(is_sphere, 5, 12)):
+    if len(starts) != commands or np.any(np.diff(starts, append=len(values)) != np.where(is_sphere, 5, 12)):
         return False
     spheres = values[starts[is_sphere, None] + np.arange(1, 5)]
     surfaces = values[starts[~is_sphere, None] + np.arange(1, 12)]
@@ -397,24 +400,44 @@ def _read_plain(draft: _Draft, block: bytes, lines: int) -> bool:
     draft.spheres.numbers.frombytes(spheres.tobytes())
     draft.spheres.material.frombytes(material.astype(np.int32).tobytes())
     draft.spheres.order.frombytes(order.astype(np.int32).tobytes())
-    draft.commands += lines
+    draft.commands += commands
     return True
 
 
-def _plain_values(block: bytes, lines: int) -> np.ndarray | None:
+def _bare_lines(block: bytes) -> bytes | None:
+    """The block without comments, indents and blank lines, each line with its end; None if it is doubtful what it says.
+
+    What a comment says is looked at by whoever knows the messages, unless it is plain text.
+    """
+    if len(block) > LONGEST_LINE or not block.endswith(b"\n"):
+        return None
+    if b"#" in block:
+        if not block.isascii() or b"\0" in block:
+            return None
+        block = _COMMENT.sub(b"", block)
+    if b"\r" in block or b"\t" in block:
+        block = block.replace(b"\r\n", b"\n").replace(b"\t", b" ")
+    if block.startswith((b" ", b"\n")) or b"\n " in block or b"\n\n" in block:
+        block = _INDENT.sub(b"\n", b"\n" + block)[1:]
+    return block
+
+
+_COMMENT = re.compile(rb"#[^\n]*")
+_INDENT = re.compile(rb"\n[ \n]+")
+
+
+def _plain_values(lines: bytes) -> np.ndarray | None:
     """The words of a block as numbers, with nan for `sphere` and inf for `surface`, which no number of a file may be.
 
     None if a line starts with anything else, or if there is a letter that these two words, and numbers, do not need.
     So each line gives one nan or inf at its start; any further one comes from a fault in it.
     """
-    if b"\r" in block or b"\t" in block:
-        block = block.replace(b"\r\n", b"\n").replace(b"\t", b" ")
-    if block.translate(None, _PLAIN) or not block.endswith(b"\n") or len(block) > LONGEST_LINE:
+    if lines.translate(None, _PLAIN):
         return None
-    ahead = b"\n" + block
+    ahead = b"\n" + lines
     marked = ahead.replace(b"\nsphere ", b"\nnan ")
     marked_all = marked.replace(b"\nsurface ", b"\ninf ")
-    if (len(ahead) - len(marked)) // 3 + (len(marked) - len(marked_all)) // 4 != lines:
+    if (len(ahead) - len(marked)) // 3 + (len(marked) - len(marked_all)) // 4 != lines.count(b"\n"):
         return None
     words = marked_all.split()
     try:
@@ -481,10 +504,10 @@ def write_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
 
 
 def to_cli(scene: Scene) -> str:
-    """The scene as the text of a `.cli` file. Reading it gives an equal scene.
+    """The scene as the text of a `.cli` file. Reading it gives an equal scene if its materials are used in their order.
 
-    A file can only bring its materials in the order of their use. Where a shape goes back to an earlier one, that is
-    written again: every shape then still has its material, though the table of materials has grown.
+    Where a shape goes back to an earlier material, that is written again: every shape still has its own, though the
+    table of materials has grown.
     """
     return "".join(_lines(scene))
 

@@ -12,8 +12,10 @@ from raytracer.scene import Light, Scene
 from raytracer.stages import STAGES, Stage
 from raytracer.trace import Eye, open_eye
 
+_TESTS_A_LIGHT = 20  # what shading by a light costs, in tests of a ray against a sphere
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, eq=False)
 class Plan:
     """Everything that is decided before the first ray is shot."""
 
@@ -25,6 +27,12 @@ class Plan:
     lights: tuple[Light, ...]
     why: tuple[str, ...]  # sentences for a person: what is computed, what is not, and the reason
     warnings: tuple[str, ...]  # those that a person should see unasked
+
+    @property
+    def bands(self) -> list[slice]:
+        """The picture's rows, cut into pieces that are drawn one at a time; thinner ones where a pixel takes long."""
+        pixels = self.raster.width * self.raster.height
+        return self.raster.bands(self.eye.tests / pixels + _TESTS_A_LIGHT * len(self.lights))
 
 
 def make_plan(
@@ -90,7 +98,7 @@ def _reasons_for_tracing(scene: Scene, eye: Eye) -> Iterator[str]:
         f"{_count(radii, 'sphere')}: tested one after the other, each within the box of pixels that can see it, "
         f"{eye.tests / pixels:.3g} tests a pixel"
     )
-    if eye.targets.path is plain and backend.has_compiler():
+    if eye.targets.path is plain and not backend.why_no_compiler():
         yield "few tests: numpy is done before the compiler would be loaded"
     if on.any():
         yield f"the eye lies exactly on {_count(range(int(on.sum())), 'sphere')}: the hit at t = 0 does not count"
@@ -103,8 +111,8 @@ def _reasons_for_tracing(scene: Scene, eye: Eye) -> Iterator[str]:
 def _warnings(scene: Scene) -> Iterator[str]:
     if len(scene.triangles):
         yield f"{_count(scene.triangles, 'triangle')} not drawn: only spheres are, so far"
-    if not backend.has_compiler():
-        yield "numba is not installed: numpy draws the same picture, slowly"
+    if fault := backend.why_no_compiler():
+        yield f"{fault}: numpy draws the same picture, slowly"
 
 
 def _count(things: Sized, word: str) -> str:

@@ -43,9 +43,10 @@ def render_scene(
 ) -> np.ndarray:
     """The picture of a scene at a stage: uint8 (height, width, 3), red, green, blue, the top row first.
 
-    `out` is an array of that shape to draw into. `progress(done, total, rows)` is called after each finished band of
-    rows, from the calling thread; `cancelled()` before each, from the threads that draw. Raises ValueError for a stage,
-    size, sampling or method that there is not, `PictureTooLargeError` before anything is drawn, and `Cancelled`.
+    `out` is an array of that shape to draw into. `progress(done, total, rows)` is called after each band of rows, with
+    those that are finished, from the calling thread; `cancelled()` before each, from the threads that draw. Raises
+    ValueError for a stage, size, sampling or method that there is not, `PictureTooLargeError` before anything is drawn,
+    and `Cancelled`.
     """
     plan = make_plan(scene, stage, width, height, sampling, method)
     return draw(plan, threads=threads, out=out, progress=progress, cancelled=cancelled)
@@ -62,12 +63,13 @@ def draw(
     """`render_scene` for whoever has made the plan already."""
     shape = plan.raster.height, plan.raster.width, 3
     picture = np.empty(shape, np.uint8) if out is None else _fitting(out, shape)
-    whole = trace_whole(plan, threads, cancelled) if plan.stage.needs_whole else None
+    whole = trace_whole(plan, threads, progress, cancelled) if plan.stage.needs_whole else None
 
-    def draw_band(rows: slice) -> None:
+    def draw_band(rows: slice) -> slice:
         picture[rows] = to_bytes(draw_rows(plan, rows, whole))
+        return rows
 
-    _each_band(plan.raster, draw_band, threads, progress, cancelled)
+    _each_band(plan.bands, draw_band, threads, progress, cancelled, done=len(plan.bands) if whole else 0)
     return picture
 
 
@@ -84,14 +86,20 @@ def draw_rows(plan: Plan, rows: slice, whole: Whole | None) -> np.ndarray:
         return plan.stage.colours(Block(plan.scene, plan.raster, rows, hits, plan.lights, whole, truth))
 
 
-def trace_whole(plan: Plan, threads: int | None = None, cancelled: Callable[[], bool] | None = None) -> Whole:
-    """The hits of the whole picture, for a stage that wants them before it draws the first pixel."""
+def trace_whole(
+    plan: Plan,
+    threads: int | None = None,
+    progress: Progress | None = None,
+    cancelled: Callable[[], bool] | None = None,
+) -> Whole:
+    """The hits of the whole picture, for a stage that wants them before it draws the first pixel: half of its work."""
     hits = _empty_hits(plan.raster)
 
-    def trace(rows: slice) -> None:
+    def trace(rows: slice) -> slice:
         hits.t[rows], hits.index[rows] = trace_rows(plan.eye, rows)
+        return slice(rows.start, rows.start)
 
-    _each_band(plan.raster, trace, threads, None, cancelled)
+    _each_band(plan.bands, trace, threads, progress, cancelled, ahead=len(plan.bands))
     return Whole(hits)
 
 
@@ -113,35 +121,39 @@ def eye_hits(
     check_method(method)
     eye, hits = open_eye(scene, raster, method), _empty_hits(raster)
 
-    def trace(rows: slice) -> None:
+    def trace(rows: slice) -> slice:
         hits.t[rows], hits.index[rows] = polished_rows(eye, rows)
+        return rows
 
-    _each_band(raster, trace, threads, None, None)
+    _each_band(raster.bands(eye.tests / (raster.width * raster.height)), trace, threads, None, None)
     return hits
 
 
 def _each_band(
-    raster: Raster,
-    work: Callable[[slice], None],
+    bands: list[slice],
+    work: Callable[[slice], slice],
     threads: int | None,
     progress: Progress | None,
     cancelled: Callable[[], bool] | None,
+    done: int = 0,
+    ahead: int = 0,
 ) -> None:
-    """Do the work for all bands, on a pool of threads; the first exception ends it."""
+    """Do the work for all bands, on a pool of threads; the first exception ends it.
+
+    Work returns the rows of the picture that it has finished. `done` and `ahead` count bands of other work.
+    """
 
     def one(rows: slice) -> slice:
         if cancelled is not None and cancelled():
             raise Cancelled
-        work(rows)
-        return rows
+        return work(rows)
 
-    bands = raster.bands
     with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
         try:
-            for done, future in enumerate(as_completed([pool.submit(one, rows) for rows in bands]), 1):
+            for count, future in enumerate(as_completed([pool.submit(one, rows) for rows in bands]), done + 1):
                 rows = future.result()
                 if progress is not None:
-                    progress(done, len(bands), rows)
+                    progress(count, done + len(bands) + ahead, rows)
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise
@@ -153,6 +165,7 @@ def _empty_hits(raster: Raster) -> Hits:
 
 
 def _fitting(out: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    if out.shape != shape or out.dtype != np.uint8:
-        raise ValueError(f"out: found {out.dtype} {out.shape}, expected uint8 {shape}")
+    if not isinstance(out, np.ndarray) or out.shape != shape or out.dtype != np.uint8:
+        found = f"{out.dtype} {out.shape}" if isinstance(out, np.ndarray) else type(out).__name__
+        raise ValueError(f"out: found {found}, expected uint8 {shape}")
     return out

@@ -72,7 +72,7 @@ def open_eye(scene: Scene, raster: Raster, method: str = CERTIFIED) -> Eye:
     known = balls(method, spheres.centres[in_view], spheres.radii[in_view])
     left, right, top, bottom = boxes.astype(np.int64).T
     tests = int(((right - left) * (bottom - top)).sum())
-    path = backend.choose(tests, len(raster.bands) * len(radii))
+    path = backend.choose(tests, len(raster.bands()) * len(radii))
     seen = path.see(origin, centres, radii)
     on = _settle_sides(origin, centres, radii, seen)
     kappa = spread(raster) if spread(raster) <= LARGEST_SPREAD else 0.0
@@ -120,6 +120,8 @@ def ray_intersect_scene(
     no normalising, t counts multiples of them. Which sphere is hit is what exact arithmetic says: only t > 0 counts, a
     tangent ray hits, from inside the far root is the hit, and of equal t the sphere that comes first wins. With another
     method of `METHODS`, it is what that method makes of it.
+
+    A t beyond the range of float64 is +inf or 0, its index says that it is a hit all the same.
 
     ValueError: there is no such method, a direction is zero, a number is not finite, a radius is not positive, or the
     shapes do not fit.

@@ -64,3 +64,31 @@ def test_a_changed_source_does_not_run_stale_machine_code(tmp_path):
         "print(first.strip(), subprocess.run(run, cwd=copy, capture_output=True, text=True).stdout.strip())\n"
     )
     assert in_a_fresh_process(code) == "2.0 3.0\n"
+
+
+def test_a_compiler_that_cannot_be_loaded_is_told_of_and_done_without(tmp_path):
+    (tmp_path / "numba").mkdir()
+    (tmp_path / "numba" / "__init__.py").write_text("raise ImportError('Numba needs another NumPy')")
+    code = (
+        f"import sys; sys.path.insert(0, {str(tmp_path)!r})\n"
+        "from raytracer import backend, interpreter, make_plan, plain\n"
+        "assert backend.load() is plain\n"
+        "print(make_plan(interpreter('scenes/01_one_sphere.cli')).warnings)\n"
+    )
+    assert "numba cannot be loaded (Numba needs another NumPy)" in in_a_fresh_process(code)
+
+
+def test_machine_code_is_kept_elsewhere_where_the_package_cannot_be_written_to(tmp_path):
+    code = (
+        "import pathlib\n"
+        "mkdir = pathlib.Path.mkdir\n"
+        "def refuse(self, *rest, **more):\n"
+        "    if 'kernels' in self.parts: raise PermissionError\n"
+        "    mkdir(self, *rest, **more)\n"
+        "pathlib.Path.mkdir = refuse\n"
+        f"pathlib.Path.expanduser = lambda self: pathlib.Path({str(tmp_path)!r})\n"
+        "from raytracer.kernels import see; import numpy as np\n"
+        "see(np.zeros(3), np.ones((1, 3)), np.ones(1))\n"
+        f"print(len(list(pathlib.Path({str(tmp_path)!r}).rglob('*.nbi'))) > 0)\n"
+    )
+    assert in_a_fresh_process(code) == "True\n"

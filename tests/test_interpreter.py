@@ -271,7 +271,9 @@ sphere; surface; sphere 1 2 3; sphere 1 2 3 4 5; surface 1 2 3 4; spheresurface 
 sphere 1 2 3 4 sphere 1 2 3 4; sphere 1 2 3 surface; sphere 1 2 3 -sphere; surface 1 2 3 4 5 6 sphere 1 2 3 4
 surface 1 2 3 4 5 6 7 8 9 10; surface 1 2 3 4 5 6 7 8 9 10 +surface; nan 1 2 3 4; inf 1 2 3 4; 1 2 3 4
 sphere 1 2-3 4; sphere 1 2 3 e; sphere 1 2\r3 4; sphere 1 2 3\r4; sphere 1 2\x0b3 4; sphere 1\x0c 2 3; sphere 1 2 3 4\r
-sphere 1 2 3 é; sphere 1 2 3 ٣; sphere 1 2 3 4\0"""  # what looks plain and is not, or looks odd and is right
+sphere 1 2 3 é; sphere 1 2 3 ٣; sphere 1 2 3 4\0;  sphere 1 2 3 4; \t sphere 1 2 3 4 ;   ; # sphere; sphere 1 2 3 4 # é
+sphere 1 2 3 4# surface; sphere 1 2 3 #4;   # \0; # \r sphere 1 2 3 4; sphere 1 2 3 4\r# x; #; sphere# 1 2 3 4"""
+# what looks plain and is not, or looks odd and is right
 LINES = PLAIN * 3 + [line for row in CLOSE.split("\n") for line in row.split("; ")]
 
 
@@ -308,12 +310,13 @@ def test_the_fast_way_reads_what_float_reads(numbers: list[float], digits: int) 
         return
     text = (SURFACE + f"sphere {' '.join(words)}\n").encode()
     draft = reader._Draft()
-    assert reader._read_plain(draft, text, 2)
+    assert reader._read_plain(draft, text)
     assert repr(draft.spheres.numbers.tolist()) == repr([radius, *centre])
 
 
 def test_plain_lines_take_the_fast_way(monkeypatch: pytest.MonkeyPatch) -> None:
-    text = "".join(line + end for line in PLAIN[::-1] for end in ("\n", "\r\n")).encode()
+    ends = ("\n", "\r\n", "\n\n  \n", " # as it was\n  ", "#\n\t")
+    text = ("".join(line + end for line in PLAIN[::-1] for end in ends) + "\n").encode()
     slow = line_by_line(monkeypatch, text)
     monkeypatch.setattr(reader, "_read_lines", lambda *_: pytest.fail("read line by line"))
     assert isinstance(slow, Scene)

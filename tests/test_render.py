@@ -2,6 +2,7 @@
 
 import os
 import threading
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from strategies import scenes as any_scene
 
 from raytracer import (
     STAGES,
+    Camera,
     Cancelled,
     Scene,
     backend,
@@ -69,7 +71,7 @@ def test_edges_lie_where_the_shape_changes_also_between_bands():
     edge[:, :-1] |= index[:, :-1] != index[:, 1:]
     edge[:-1] |= index[:-1] != index[1:]
     np.testing.assert_array_equal(picture[..., 0] == 0, edge)
-    assert len(make_plan(ONE, "edges", 1200, 90).raster.bands) > 1
+    assert len(make_plan(ONE, "edges", 1200, 90).bands) > 1
 
 
 def test_diffuse_adds_lights_and_has_no_shadows_or_ambient():
@@ -94,7 +96,7 @@ def test_bytes_are_rounded_and_clipped():
 def test_threads_bands_and_reused_pictures_change_nothing(stage, monkeypatch):
     scene = interpreter("scenes/04_many_spheres.cli")
     expected = render_scene(scene, stage, 50, 40, threads=1)
-    monkeypatch.setattr("raytracer.camera._BAND_PIXELS", 150)
+    monkeypatch.setattr("raytracer.camera.BAND_PIXELS", 150)
     out = np.full((40, 50, 4), 7, np.uint8)
     assert render_scene(scene, stage, 50, 40, threads=3, out=out[..., :3]).base is out
     np.testing.assert_array_equal(out[..., :3], expected)
@@ -144,7 +146,7 @@ def test_the_plan_gives_its_reasons(monkeypatch):
     assert make_plan(interpreter("scenes/05_one_triangle.cli")).warnings == (
         "1 triangle not drawn: only spheres are, so far",
     )
-    monkeypatch.setattr(backend, "has_compiler", lambda: False)
+    monkeypatch.setattr(backend, "why_no_compiler", lambda: "numba is not installed")
     assert "numpy draws the same picture, slowly" in make_plan(ONE).warnings[0]
 
 
@@ -208,3 +210,50 @@ def test_png_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
         save_png(path, picture[::-1])
     assert path.read_bytes() == before
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_link_is_followed_and_a_pipe_is_written_to(tmp_path):
+    picture = render_scene(ONE, width=20, height=10)
+    (tmp_path / "link.png").symlink_to(tmp_path / "real.png")
+    save_png(tmp_path / "link.png", picture)
+    assert (tmp_path / "link.png").is_symlink()
+    np.testing.assert_array_equal(load_png(tmp_path / "real.png"), picture)
+    os.mkfifo(tmp_path / "pipe")
+    writer = threading.Thread(target=save_png, args=(tmp_path / "pipe", picture))
+    writer.start()
+    assert (tmp_path / "pipe").read_bytes() == (tmp_path / "real.png").read_bytes()
+    writer.join()
+    assert (tmp_path / "pipe").is_fifo()
+
+
+def test_threads_that_save_to_one_place_do_not_meet(tmp_path):
+    picture = render_scene(ONE, width=20, height=10)
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(lambda _: save_png(tmp_path / "one.png", picture), range(60)))
+    np.testing.assert_array_equal(load_png(tmp_path / "one.png"), picture)
+    assert len(list(tmp_path.iterdir())) == 1
+
+
+@pytest.mark.parametrize(
+    ("camera", "message"),
+    [
+        (Camera(fov=float("nan")), "fov"),
+        (Camera(fov=180.0), "fov"),
+        (Camera(eye=(0.0, float("inf"), 0.0)), "not finite"),
+        (Camera(u=(0.0, 0.0, 2.0)), "dependent"),
+    ],
+)
+def test_a_camera_that_no_file_could_say_is_refused(camera, message):
+    with pytest.raises(ValueError, match=message):
+        render_scene(Scene(camera))
+
+
+def test_sizes_may_be_numpys_integers():
+    assert render_scene(ONE, "hit", np.uint8(200), np.int32(7)).shape == (7, 200, 3)
+
+
+def test_a_picture_whose_pixels_take_long_is_cut_into_thin_bands():
+    crowd = interpret(SURFACE + "sphere 1 0 0 -4\n" * 3000)
+    assert len(make_plan(crowd, "hit").bands) > 12 > len(make_plan(ONE, "hit").bands)
+    bright = interpret("light 0 4 5 1 1 1\n" * 3000 + SURFACE + "sphere 1 0 0 -4\n")
+    assert len(make_plan(bright).bands) > 100

@@ -11,18 +11,19 @@ from __future__ import annotations
 
 import hashlib
 import math
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
+from getpass import getuser
 from pathlib import Path
+from tempfile import gettempdir
 from types import FunctionType, ModuleType
 
 import numba
 from numba.extending import overload, register_jitable
 
 from raytracer import certified, methods, twofold
-
-compiled = partial(numba.njit, cache=True, nogil=True, error_model="numpy")
 
 
 @overload(twofold.select)
@@ -54,14 +55,36 @@ for _module in _SOURCES:
     _compile_calls_into(_module)
 
 
+def _cache_folder() -> Path | None:
+    """Where machine code is kept: a folder named after the sources, in the first place that can be written to."""
+    here = Path(__file__).parent
+    sources = [Path(module.__file__ or "") for module in _SOURCES] + sorted(here.glob("*.py"))
+    digest = hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()[:16]
+    places = (
+        here / "__pycache__",
+        Path("~/.cache/raytracer").expanduser(),
+        Path(gettempdir()) / f"raytracer-{getuser()}",
+    )
+    return next((place / digest for place in places if _can_write(place / digest)), None)
+
+
+def _can_write(folder: Path) -> bool:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return False
+    return os.access(folder, os.W_OK)
+
+
+_CACHE = _cache_folder()
+compiled = partial(numba.njit, cache=_CACHE is not None, nogil=True, error_model="numpy")
+
+
 @contextmanager
 def cache_named_after_sources() -> Iterator[None]:
     """While this lasts, kernels that are defined take their machine code from, and put it into, that folder."""
-    folder = Path(__file__).parent
-    sources = [Path(module.__file__ or "") for module in _SOURCES] + sorted(folder.glob("*.py"))
-    digest = hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()
     before = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(folder / "__pycache__" / digest[:16])
+    numba.config.CACHE_DIR = str(_CACHE or before)
     try:
         yield
     finally:
