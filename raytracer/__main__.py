@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from tqdm import tqdm
 
-from raytracer import Plan, SceneError, interpreter, make_plan, save_png
+from raytracer import Plan, SceneError, interpreter, make_plan, probe_pixel, save_png
 from raytracer.camera import SAMPLINGS
 from raytracer.image import check_can_save
 from raytracer.methods import CERTIFIED, METHODS
@@ -50,6 +50,15 @@ def check(arguments: argparse.Namespace) -> int:
 def explain(arguments: argparse.Namespace) -> int:
     """Say what drawing a scene takes, what it does not, and why."""
     print(*_plan(arguments).why, sep="\n")
+    return 0
+
+
+def inspect(arguments: argparse.Namespace) -> int:
+    """Tell the story of one pixel: its ray, the shapes near it, what is computed and what is true."""
+    scene, (width, height) = interpreter(arguments.scene), arguments.size
+    place = arguments.x, arguments.y, width, height, arguments.stage, arguments.sampling, arguments.method
+    pixel = probe_pixel(scene, *place)
+    print(pixel.as_pytest() if arguments.pytest else "\n".join(pixel.story()))
     return 0
 
 
@@ -120,6 +129,16 @@ COMMANDS: dict[str, tuple[Callable[[argparse.Namespace], int], tuple[Argument, .
     ),
     "check": (check, (Argument(("scenes",), {"metavar": "SCENE", "type": Path, "nargs": "+", "help": ".cli files"}),)),
     "explain": (explain, (_SCENE, *_PICTURE)),
+    "inspect": (
+        inspect,
+        (
+            _SCENE,
+            Argument(("x",), {"metavar": "X", "type": int, "help": "the pixel's column, from the left, from 0"}),
+            Argument(("y",), {"metavar": "Y", "type": int, "help": "its row, from the top, from 0"}),
+            *_PICTURE,
+            Argument(("--pytest",), {"action": "store_true", "help": "print the pixel as a test case instead"}),
+        ),
+    ),
     "verify": (
         verify,
         (

@@ -12,6 +12,7 @@ where L = origin − centre. Signs of integers are certain, and two roots are pu
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from decimal import MAX_EMAX, MIN_EMIN, Decimal, localcontext
 from fractions import Fraction
 from math import inf, isqrt, lcm
 from typing import NamedTuple
@@ -45,6 +46,48 @@ class Root(NamedTuple):
                 return nearest
             bits = 2 * bits or 64
 
+    def decimal(self, digits: int) -> Decimal:
+        """The root, to so many digits: off by less than one in the last."""
+        bits = 0
+        while True:
+            root = isqrt(self.radicand << 2 * bits)
+            number = (self.base << bits) + self.sign * root
+            exact = root * root == self.radicand << 2 * bits
+            if exact or abs(number) > 10 ** (digits + 1):
+                return quotient(number * self.over, self.under << bits, digits)
+            bits = 2 * bits or 64
+
+
+class Line(NamedTuple):
+    """A whole line and a sphere: the quadratic a·t² + 2h·t + c = 0 of their meeting, and its roots if it has any."""
+
+    a: Fraction
+    h: Fraction
+    c: Fraction
+    disc: Fraction  # h² − a·c
+    near: Root | None
+    far: Root | None
+
+
+def line(origin: Sequence[Exact], direction: Sequence[Exact], centre: Sequence[Exact], radius: Exact) -> Line:
+    """Everything about the line of a ray and a sphere."""
+    away = [Fraction(o) - Fraction(c) for o, c in zip(origin, centre, strict=True)]
+    a = sum((Fraction(x) ** 2 for x in direction), Fraction(0))
+    h = sum((Fraction(x) * y for x, y in zip(direction, away, strict=True)), Fraction(0))
+    c = side(origin, centre, radius)
+    (*numbers, size), unit = _integers([*origin, *centre, radius])
+    steps, step_unit = _integers(direction)
+    eye, middle = numbers[:3], numbers[3:]
+    return Line(a, h, c, h * h - a * c, *_roots(eye, steps, [*middle, size], step_unit, unit))
+
+
+def quotient(numerator: int, denominator: int, digits: int) -> Decimal:
+    """numerator / denominator, rounded to so many digits."""
+    with localcontext() as context:
+        context.prec = digits
+        context.Emax, context.Emin = MAX_EMAX, MIN_EMIN
+        return Decimal(numerator) / Decimal(denominator)
+
 
 def nearest_hit(
     origin: Sequence[Exact], direction: Sequence[Exact], spheres: Iterable[tuple[Sequence[Exact], Exact]]
@@ -77,18 +120,24 @@ def side(origin: Sequence[Exact], centre: Sequence[Exact], radius: Exact) -> Fra
 
 
 def _hit(eye: list[int], steps: list[int], sphere: list[int], over: int, under: int) -> Root | None:
+    for root in _roots(eye, steps, sphere, over, under):
+        if root is not None and _sign_with_root(root.base, root.sign, root.radicand) > 0:
+            return root
+    return None
+
+
+def _roots(
+    eye: list[int], steps: list[int], sphere: list[int], over: int, under: int
+) -> tuple[Root, Root] | tuple[None, None]:
     (ox, oy, oz), (dx, dy, dz), (cx, cy, cz, radius) = eye, steps, sphere
     lx, ly, lz = ox - cx, oy - cy, oz - cz
     a = dx * dx + dy * dy + dz * dz
     x, y, z = dy * lz - dz * ly, dz * lx - dx * lz, dx * ly - dy * lx
     radicand = radius * radius * a - (x * x + y * y + z * z)
     if radicand < 0:
-        return None
+        return None, None
     middle = -(dx * lx + dy * ly + dz * lz)
-    for sign in (-1, 1):
-        if _sign_with_root(middle, sign, radicand) > 0:
-            return Root(middle, sign, radicand, over, a * under)
-    return None
+    return Root(middle, -1, radicand, over, a * under), Root(middle, 1, radicand, over, a * under)
 
 
 def _sign_with_root(base: int, sign: int, radicand: int) -> int:

@@ -1,19 +1,71 @@
-"""The story of one pixel: its ray, what the ray hits, and the colour that comes of it."""
+"""The story of one pixel: its ray, the shapes near it, what is hit, and the colour that comes of it."""
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Iterator
 from dataclasses import dataclass
+from decimal import Decimal
+from fractions import Fraction
+from types import FrameType
+from typing import Any
 
 import numpy as np
 
-from raytracer.camera import directions, eye_grid
+from raytracer import certified, exact, methods, plain
+from raytracer.camera import directions, eye_grid, twofold_eye_rays
+from raytracer.exact import Root, quotient
 from raytracer.image import to_bytes
-from raytracer.methods import CERTIFIED
-from raytracer.plan import make_plan
+from raytracer.methods import CERTIFIED, METHODS
+from raytracer.plan import Plan, make_plan
 from raytracer.render import draw_rows, trace_whole
 from raytracer.scene import Colour, Scene, Shape, Sphere, Vector, vector
 from raytracer.stages import Block
-from raytracer.trace import polished_rows
+from raytracer.trace import Eye, level, polished_rows
+
+_DIGITS = 17  # of a float64
+_MOST_SHAPES = 8
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One value, as the method computed it and in truth."""
+
+    name: str
+    found: float
+    true: Decimal
+
+    def __str__(self) -> str:
+        return f"  {self.name:7}{marked(self.found, self.true):26}{self.true:.{_DIGITS - 1}e}"
+
+
+@dataclass(frozen=True)
+class Meeting:
+    """A ray and one of the spheres near it. t and true_t are +inf where the method, or the truth, sees no hit.
+
+    For `certified`, t is what float64 makes of it, and NaN where that is not certain.
+    """
+
+    index: int  # the shape's place among all shapes of the file
+    shape: Sphere
+    figures: tuple[Figure, ...]
+    t: float
+    true_t: float
+
+    def lines(self) -> Iterator[str]:
+        yield f"shape {self.index}, {describe(self.shape)}"
+        yield f"  {'':7}{'as computed |':26}in truth"
+        yield from map(str, self.figures)
+        yield f"  {'t':7}{_hit_or_miss(self.t):26}{_hit_or_miss(self.true_t)}"
+
+
+@dataclass(frozen=True)
+class Lighting:
+    """What a light adds to the diffuse colour."""
+
+    position: Vector
+    cosine: float  # N·L
+    colour: Colour
 
 
 @dataclass(frozen=True)
@@ -22,27 +74,71 @@ class Pixel:
 
     x: int  # column, from the left
     y: int  # row, from the top
+    width: int
+    height: int
     stage: str
+    method: str
     eye: Vector
-    direction: Vector
+    direction: Vector  # rounded
+    exact_direction: tuple[Fraction, Fraction, Fraction]
     index: int  # the shape's place among all shapes of the file
     shape: Shape | None
     t: float
+    level: str  # what it took to be certain, or nothing for another method
+    lead: float | None  # by how much the winner's t is smaller than that of the next, if any
+    meetings: tuple[Meeting, ...]  # the spheres whose box of pixels this one lies in, nearest first
     point: Vector | None
     normal: Vector | None
+    lights: tuple[Lighting, ...]
     colour: Colour  # as the stage computed it, neither clipped nor rounded
     rgb: tuple[int, int, int]  # as it is drawn
 
     def lines(self) -> list[str]:
-        """The story in words, a line each."""
+        """The story in short, a line each."""
         story = [f"pixel {self.x} {self.y}", f"ray from {_numbers(self.eye)} along {_numbers(self.direction)}"]
         if self.shape is None:
             story += ["hits nothing"]
         else:
-            story += [f"hits shape {self.index}, {_describe(self.shape)}", f"at t = {self.t!r}"]
+            lead = "" if self.lead is None else f", the next by {self.lead:.6g} more"
+            story += [f"hits shape {self.index}, {describe(self.shape)}", f"at t = {self.t!r}{lead}"]
+        if self.level:
+            story += [f"decided in {self.level}"]
         if self.point is not None and self.normal is not None:
             story += [f"point {_numbers(self.point)}", f"normal {_numbers(self.normal)}"]
+        for light in self.lights:
+            story += [f"light {_numbers(light.position)}: N·L = {light.cosine:.6g} adds {_numbers(light.colour)}"]
         return [*story, f"{self.stage}: colour {_numbers(self.colour)}", f"drawn as {_numbers(self.rgb)}"]
+
+    def story(self) -> list[str]:
+        """The whole story: the exact ray, and every near shape's quadratic as computed and in truth."""
+        ray = ", ".join(str(component) for component in self.exact_direction)
+        first, *rest = self.lines()
+        meetings = [line for meeting in self.meetings for line in meeting.lines()]
+        return [
+            f"{first} of {self.width} x {self.height}, method {self.method}",
+            f"ray exactly along ({ray})",
+            *rest,
+            *meetings,
+        ]
+
+    def as_pytest(self) -> str:
+        """A test of `ray_intersect_scene`'s kind, with the truth of this pixel's ray, to paste into one's own tests."""
+        spheres = [(meeting.shape.centre, meeting.shape.radius) for meeting in self.meetings]
+        true = min((meeting.true_t for meeting in self.meetings), default=np.inf)
+        truth = f"pytest.approx({true!r}, rel=1e-12)" if np.isfinite(true) else "float('inf')  # a miss"
+        name = f"test_pixel_{self.x}_{self.y}_of_{self.width}_by_{self.height}"
+        return "\n".join(
+            [
+                "import pytest",
+                "",
+                "",
+                f"def {name}():",
+                f"    origin, direction = {self.eye!r}, {self.direction!r}",
+                f"    spheres = {spheres!r}  # centre, radius",
+                "    t = min((intersect(origin, direction, c, r) for c, r in spheres), default=float('inf'))",
+                f"    assert t == {truth}",
+            ]
+        )
 
 
 def probe_pixel(
@@ -61,23 +157,135 @@ def probe_pixel(
     plan = make_plan(scene, stage, width, height, sampling, method)
     row = slice(y, y + 1)
     rays, hits = directions(eye_grid(plan.raster, row)), polished_rows(plan.eye, row)
-    block = Block(scene, plan.raster, row, hits, plan.lights)
+    block = Block(scene, plan.raster, row, hits, scene.lights)
     colour = draw_rows(plan, row, trace_whole(plan) if plan.stage.needs_whole else None)[0, x]
     index, point, normal = int(hits.index[0, x]), None, None
     if index >= 0:
-        k = np.count_nonzero(block.hit[0, :x])
+        k = int(np.count_nonzero(block.hit[0, :x]))
         point, normal = vector(block.points[k]), vector(block.normals[k])
+    meetings = _meetings(plan, x, y)
+    others = [m.true_t if method == CERTIFIED else m.t for m in meetings if m.index != index]
+    lead = min(others, default=np.inf) - float(hits.t[0, x]) if index >= 0 else np.inf
+    certainty = level(plan.eye, x, y) if method == CERTIFIED else ""
     return Pixel(
-        x, y, stage, scene.camera.eye, vector(np.array(rays)[:, 0, x]),
-        index, scene.shape(index) if index >= 0 else None, float(hits.t[0, x]), point, normal,
+        x, y, width, height, stage, method, scene.camera.eye, vector(np.array(rays)[:, 0, x]),
+        plan.raster.exact_direction(x, y), index, scene.shape(index) if index >= 0 else None, float(hits.t[0, x]),
+        certainty, lead if np.isfinite(lead) else None, meetings, point, normal,
+        tuple(_lightings(block, k)) if index >= 0 and plan.stage.needs_lights else (),
         vector(colour), _bytes(to_bytes(colour)),
     )  # fmt: skip
 
 
-def _describe(shape: Shape) -> str:
+def _lightings(block: Block, k: int) -> Iterator[Lighting]:
+    """What each light adds at hit k of the block."""
+    for light in block.lights:
+        cosine = float(block.normals[k] @ block.to_light(light)[k])
+        yield Lighting(light.position, cosine, vector(block.diffuse[k] * light.colour * max(0.0, cosine)))
+
+
+# --------------------------------------------------------------------------------------- the shapes near the ray
+
+
+def _meetings(plan: Plan, x: int, y: int) -> tuple[Meeting, ...]:
+    """The spheres in whose boxes the pixel lies, the nearest first, no more than a person reads."""
+    left, right, top, bottom = plan.eye.boxes.T
+    near = np.flatnonzero((left <= x) & (x < right) & (top <= y) & (y < bottom))
+    direction = plan.raster.exact_direction(x, y)
+    found = [_meeting(plan, x, y, direction, int(plan.eye.order[i])) for i in near.tolist()[:1000]]
+    return tuple(sorted(found, key=lambda meeting: (meeting.true_t, meeting.index))[:_MOST_SHAPES])
+
+
+def _meeting(plan: Plan, x: int, y: int, direction: tuple[Fraction, ...], index: int) -> Meeting:
+    sphere = plan.scene.shape(index)
+    assert isinstance(sphere, Sphere)
+    eye = plan.scene.camera.eye
+    truth = exact.line(eye, direction, sphere.centre, sphere.radius)
+    true_t, _ = exact.nearest_hit(eye, direction, [(sphere.centre, sphere.radius)])
+    found, t = _watched(plan.eye, x, y, sphere)
+    return Meeting(index, sphere, tuple(_figures(found, truth)), t, true_t)
+
+
+def _watched(eye: Eye, x: int, y: int, sphere: Sphere) -> tuple[dict[str, Any], float]:
+    """What the method's functions hold in their variables when they return, and t."""
+    ray = twofold_eye_rays(eye.raster, np.array([x]), np.array([y]))
+    seen: dict[str, Any] = {}
+    function = METHODS[eye.method].function or certified.meet
+    watched = [each.__code__ for each in (function, methods.from_discriminant, methods.nearest_ahead)]
+
+    def watch(frame: FrameType, event: str, result: object) -> None:
+        if event == "return" and frame.f_code in watched:
+            seen.update({name: value for name, value in frame.f_locals.items() if name not in seen})
+
+    before = sys.getprofile()
+    sys.setprofile(watch)
+    try:
+        with np.errstate(all="ignore"):
+            t = _one(eye.method, eye.raster.camera.eye, ray, sphere)
+    finally:
+        sys.setprofile(before)
+    return seen, float(np.ravel(t)[0])
+
+
+def _one(method: str, origin: Vector, ray: Any, sphere: Sphere) -> Any:
+    """One ray against one sphere, in numpy."""
+    row = METHODS[method]
+    if row.function is None:
+        seen = plain.see(np.array(origin), np.array([sphere.centre]), np.array([sphere.radius]))
+        square = ray.x * ray.x + ray.y * ray.y + ray.z * ray.z
+        t, _, low = certified.meet(*seen[:7], ray.x, ray.y, ray.z, square, ray.reach)
+        return np.where(low < np.inf, np.nan, t)
+    to = row.precision
+    vectors = [(to(ray.x[0]), to(ray.y[0]), to(ray.z[0])), (ray.x_low[0], ray.y_low[0], ray.z_low[0])]
+    start, centre = tuple(map(to, origin)), tuple(map(to, sphere.centre))
+    return row.function(start, *vectors[: 1 + row.twofold], centre, to(sphere.radius))
+
+
+def _figures(found: dict[str, Any], truth: exact.Line) -> Iterator[Figure]:
+    """The variables of the quadratic by name, those in units of powers of two brought back."""
+    unit, step = (int(np.ravel(found.get(name, 0))[0]) for name in ("unit", "step"))
+    scales = {"a": 2 * step, "h": step + unit, "b": step + unit, "c": 2 * unit, "near": unit - step, "far": unit - step}
+    true: dict[str, Fraction | Root | None] = {
+        "a": truth.a, "b": 2 * truth.h, "c": truth.c, "h": truth.h, "near": truth.near, "far": truth.far,
+    }  # fmt: skip
+    disc = 4 * truth.disc if "b" in found else truth.disc / truth.a if "chord2" in found else truth.disc
+    name_of_disc = "chord2" if "chord2" in found else "disc"
+    true[name_of_disc], scales[name_of_disc] = disc, 2 * (step + unit)
+    for name in ("a", "b" if "b" in found else "h", "c", name_of_disc, "near", "far"):
+        value, what = found.get(name), true[name]
+        if value is not None and what is not None:
+            yield Figure(name, float(np.ldexp(np.float64(np.ravel(value)[0]), scales[name])), _decimal(what))
+
+
+def _decimal(value: Fraction | Root) -> Decimal:
+    if isinstance(value, Root):
+        return value.decimal(_DIGITS + 3)
+    return quotient(value.numerator, value.denominator, _DIGITS + 3)
+
+
+def marked(found: float, true: Decimal) -> str:
+    """A float in all of its digits, with a bar behind the last one that is right."""
+    if not np.isfinite(found):
+        return f"|{found}"
+    text, right = f"{Decimal(found):.{_DIGITS - 1}e}", f"{true:.{_DIGITS - 1}e}"
+    digits, exponent = text.split("e")
+    true_digits, true_exponent = right.split("e")
+    same = 0
+    if int(exponent) == int(true_exponent):
+        same = next((k for k, (a, b) in enumerate(zip(digits, true_digits, strict=False)) if a != b), len(digits))
+    return f"{digits[:same]}|{digits[same:]}e{exponent}"
+
+
+# ------------------------------------------------------------------------------------------------------ in words
+
+
+def describe(shape: Shape) -> str:
     if isinstance(shape, Sphere):
         return f"a sphere of radius {shape.radius!r} about {_numbers(shape.centre)}"
     return "a triangle " + ", ".join(_numbers(vertex) for vertex in shape.vertices)
+
+
+def _hit_or_miss(t: float) -> str:
+    return "not certain" if np.isnan(t) else repr(t) if np.isfinite(t) else "a miss"
 
 
 def _numbers(values: tuple[float, ...]) -> str:

@@ -195,6 +195,20 @@ class Bundle(NamedTuple):
     exact_direction: Callable[[int], Sequence[Fraction]]  # of ray k of these
 
 
+@_NOT_A_NUMBER_IS_NO_ERROR
+def level(eye: Eye, x: int, y: int) -> str:
+    """What it takes to be certain of a pixel: float64, two-fold float64 or integers."""
+    grid = eye_grid(eye.raster, slice(y, y + 1))
+    first = First.nothing_yet((1, len(grid.across)))
+    eye.targets.path.first_of_grid(grid, eye.seen, eye.boxes, y, eye.kappa, first)
+    if not first.unsure[0, x]:
+        return "float64"
+    bundle, (centres, radii, on, path) = _pixels_of(eye, slice(y, y + 1))((np.array([0]), np.array([x]))), eye.targets
+    found = Nearest.nothing_yet((1,))
+    path.nearest_twofold(bundle.origins, bundle.rays, bundle.boxed, centres, radii, on, found)
+    return "integers" if found.unsure[0] else "two-fold float64"
+
+
 def _settle_sides(origin: np.ndarray, centres: np.ndarray, radii: np.ndarray, seen: Seen) -> np.ndarray:
     """Find out exactly whether the origin is inside, on or outside the spheres of which `see` is not certain.
 

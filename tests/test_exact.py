@@ -77,3 +77,20 @@ def test_a_root_beyond_float64_is_infinite():
 def test_side_is_exact():
     assert exact.side((3.0, 4.0, 0.0), (0.0, 0.0, 0.0), 5.0) == 0
     assert exact.side((1e200, 0.0, 0.0), (0.0, 0.0, 0.0), math.nextafter(1e200, 0)) > 0
+
+
+@given(POINT, DIRECTION, POINT, st.integers(1, 60))
+def test_a_line_has_the_quadratics_figures_and_roots_to_any_number_of_digits(origin, direction, centre, radius):
+    line = exact.line(origin, direction, centre, radius)
+    away = [o - c for o, c in zip(origin, centre, strict=True)]
+    assert line.a == sum(x * x for x in direction)
+    assert line.h == sum(x * y for x, y in zip(direction, away, strict=True))
+    assert line.c == sum(x * x for x in away) - radius**2
+    assert line.disc == line.h**2 - line.a * line.c
+    assert (line.near is None) == (line.disc < 0)
+    if line.near is not None:
+        with mpmath.workdps(80):
+            root = mpmath.sqrt(mpmath.mpf(line.disc.numerator))
+            for sign, found in ((-1, line.near), (1, line.far)):
+                truth = (sign * root - line.h.numerator) / line.a.numerator
+                assert abs(mpmath.mpf(str(found.decimal(60))) - truth) <= abs(truth) * mpmath.mpf(10) ** -58

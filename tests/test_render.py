@@ -20,7 +20,6 @@ from raytracer import (
     load_png,
     make_plan,
     plain,
-    probe_pixel,
     render_scene,
     save_png,
 )
@@ -176,23 +175,6 @@ def test_small_work_is_done_by_numpy_until_it_has_cost_a_compiler(monkeypatch):
 def test_any_scene_draws(scene: Scene):
     for stage in STAGES:
         assert render_scene(scene, stage, 4, 3, threads=1).shape == (3, 4, 3)
-
-
-def test_a_pixels_story_is_what_is_drawn():
-    scene = interpreter("scenes/04_many_spheres.cli")
-    for stage in STAGES:
-        picture = render_scene(scene, stage, 60, 50)
-        for x, y in ((30, 25), (0, 0), (59, 49), (30, 8)):
-            pixel = probe_pixel(scene, x, y, 60, 50, stage)
-            assert pixel.rgb == tuple(picture[y, x])
-            assert (pixel.shape is None) == (pixel.index < 0) == (pixel.normal is None)
-            assert f"pixel {x} {y}" in pixel.lines()[0]
-    pixel = probe_pixel(scene, 30, 25, 60, 50)
-    assert pixel.shape == scene.spheres[0]
-    np.testing.assert_allclose(pixel.point, np.add(pixel.eye, np.multiply(pixel.t, pixel.direction)))
-    np.testing.assert_allclose(np.linalg.norm(pixel.normal), 1)
-    with pytest.raises(ValueError, match="expected one within"):
-        probe_pixel(scene, 60, 0, 60, 50)
 
 
 def test_png_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
