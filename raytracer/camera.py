@@ -13,7 +13,7 @@ from __future__ import annotations
 from decimal import Decimal, localcontext
 from fractions import Fraction
 from functools import lru_cache
-from math import inf
+from math import inf, lcm
 from operator import index
 from typing import NamedTuple
 
@@ -102,14 +102,31 @@ class Raster(NamedTuple):
         shift = SAMPLINGS[self.sampling]
         return 2 * xs + shift - self.width, self.height - 2 * ys - shift
 
+    def whole_direction(self, x: int, y: int) -> tuple[tuple[int, int, int], int]:
+        """D as the language defines it, without rounding: integers, and what they are to be divided by."""
+        (ux, uy, uz, vx, vy, vz, bx, by, bz), unit = _whole_frame(self.camera)
+        across, up = self.numerators(x, y)
+        height = self.height
+        steps = (
+            across * ux + up * vx - height * bx,
+            across * uy + up * vy - height * by,
+            across * uz + up * vz - height * bz,
+        )
+        return steps, unit * height
+
     def exact_direction(self, x: int, y: int) -> tuple[Fraction, Fraction, Fraction]:
-        """D as the language defines it, without rounding."""
-        camera = self.camera
-        across, up = (Fraction(n, self.height) for n in self.numerators(x, y))
-        back = Fraction(focal_length(camera.fov))
-        frame = zip(camera.u, camera.v, camera.w, strict=True)
-        dx, dy, dz = (across * Fraction(u) + up * Fraction(v) - back * Fraction(w) for u, v, w in frame)
-        return dx, dy, dz
+        """`whole_direction` in fractions."""
+        (dx, dy, dz), unit = self.whole_direction(x, y)
+        return Fraction(dx, unit), Fraction(dy, unit), Fraction(dz, unit)
+
+
+@lru_cache(maxsize=64)
+def _whole_frame(camera: Camera) -> tuple[list[int], int]:
+    """u, v and d·w in integers, and what they are to be divided by."""
+    back = Fraction(focal_length(camera.fov))
+    numbers = [*map(Fraction, camera.u + camera.v), *(back * Fraction(w) for w in camera.w)]
+    unit = lcm(*(number.denominator for number in numbers))
+    return [int(number * unit) for number in numbers], unit
 
 
 def eye_grid(raster: Raster, rows: slice) -> Grid:

@@ -90,27 +90,31 @@ def quotient(numerator: int, denominator: int, digits: int) -> Decimal:
 
 
 def nearest_hit(
-    origin: Sequence[Exact], direction: Sequence[Exact], spheres: Iterable[tuple[Sequence[Exact], Exact]]
+    origin: Sequence[Exact], direction: Sequence[Exact], spheres: Iterable[tuple[Sequence[Exact], Exact]], unit: int = 1
 ) -> tuple[float, int]:
     """What a ray hits first of spheres (centre, radius): t, rounded to the nearest float64, and which; or (+inf, −1).
 
-    Only t > 0 counts; a tangent ray hits; from inside, the far root is the hit; of equal roots the first sphere's wins.
+    The ray's direction is `direction` / `unit`. Only t > 0 counts; a tangent ray hits; from inside, the far root is the
+    hit; of equal roots the first sphere's wins.
     """
     best, index = None, -1
-    for i, root in enumerate(hits(origin, direction, spheres)):
+    for i, root in enumerate(hits(origin, direction, spheres, unit)):
         if root is not None and (best is None or root.is_nearer(best)):
             best, index = root, i
     return (inf, -1) if best is None else (best.nearest_float(), index)
 
 
 def hits(
-    origin: Sequence[Exact], direction: Sequence[Exact], spheres: Iterable[tuple[Sequence[Exact], Exact]]
+    origin: Sequence[Exact], direction: Sequence[Exact], spheres: Iterable[tuple[Sequence[Exact], Exact]], unit: int = 1
 ) -> list[Root | None]:
-    """The smallest positive root of each sphere, or None for a miss."""
-    spheres = list(spheres)
-    lengths, unit = _integers([*origin, *(number for centre, radius in spheres for number in (*centre, radius))])
+    """The smallest positive root of each sphere, or None for a miss; the ray's direction is `direction` / `unit`."""
+    numbers = [*origin]
+    for centre, radius in spheres:
+        numbers += (*centre, radius)
+    lengths, length_unit = _integers(numbers)
     steps, step_unit = _integers(direction)
-    return [_hit(lengths[:3], steps, lengths[k : k + 4], step_unit, unit) for k in range(3, len(lengths), 4)]
+    over = step_unit * unit
+    return [_hit(lengths[:3], steps, lengths[k : k + 4], over, length_unit) for k in range(3, len(lengths), 4)]
 
 
 def side(origin: Sequence[Exact], centre: Sequence[Exact], radius: Exact) -> Fraction:
@@ -120,24 +124,32 @@ def side(origin: Sequence[Exact], centre: Sequence[Exact], radius: Exact) -> Fra
 
 
 def _hit(eye: list[int], steps: list[int], sphere: list[int], over: int, under: int) -> Root | None:
-    for root in _roots(eye, steps, sphere, over, under):
-        if root is not None and _sign_with_root(root.base, root.sign, root.radicand) > 0:
-            return root
+    middle, radicand, a = _reduced(eye, steps, sphere)
+    if radicand < 0:
+        return None
+    for sign in (-1, 1):
+        if _sign_with_root(middle, sign, radicand) > 0:
+            return Root(middle, sign, radicand, over, a * under)
     return None
 
 
 def _roots(
     eye: list[int], steps: list[int], sphere: list[int], over: int, under: int
 ) -> tuple[Root, Root] | tuple[None, None]:
+    middle, radicand, a = _reduced(eye, steps, sphere)
+    if radicand < 0:
+        return None, None
+    return Root(middle, -1, radicand, over, a * under), Root(middle, 1, radicand, over, a * under)
+
+
+def _reduced(eye: list[int], steps: list[int], sphere: list[int]) -> tuple[int, int, int]:
+    """−D·L, Δ and D·D."""
     (ox, oy, oz), (dx, dy, dz), (cx, cy, cz, radius) = eye, steps, sphere
     lx, ly, lz = ox - cx, oy - cy, oz - cz
     a = dx * dx + dy * dy + dz * dz
     x, y, z = dy * lz - dz * ly, dz * lx - dx * lz, dx * ly - dy * lx
     radicand = radius * radius * a - (x * x + y * y + z * z)
-    if radicand < 0:
-        return None, None
-    middle = -(dx * lx + dy * ly + dz * lz)
-    return Root(middle, -1, radicand, over, a * under), Root(middle, 1, radicand, over, a * under)
+    return -(dx * lx + dy * ly + dz * lz), radicand, a
 
 
 def _sign_with_root(base: int, sign: int, radicand: int) -> int:

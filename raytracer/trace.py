@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from fractions import Fraction
 from types import ModuleType
 from typing import NamedTuple
 
@@ -152,7 +151,7 @@ def _trace_given(origins: np.ndarray, directions: np.ndarray, targets: Targets) 
         nowhere = np.zeros(len(chosen), np.int32)  # all in one pixel, which is in every box
         boxed = Boxed(nowhere, nowhere, np.tile(np.array([0, 1, 0, 1], np.int32), (len(targets.radii), 1)))
         rays = twofold_given_rays(chosen)
-        return Bundle(origins[which], rays, boxed, lambda k: [Fraction(x) for x in vector(chosen[k])])
+        return Bundle(origins[which], rays, boxed, lambda k: (chosen[k].tolist(), 1))
 
     hits = Hits(nearest.t, nearest.index)
     _settle(hits, nearest.unsure, rays_of, targets)
@@ -192,7 +191,7 @@ class Bundle(NamedTuple):
     origins: np.ndarray  # (n, 3)
     rays: TwofoldRays  # (n,)
     boxed: Boxed
-    exact_direction: Callable[[int], Sequence[Fraction]]  # of ray k of these
+    exact_direction: Callable[[int], tuple[Sequence[float], int]]  # of ray k of these: numbers, and their divisor
 
 
 @_NOT_A_NUMBER_IS_NO_ERROR
@@ -231,7 +230,7 @@ def _pixels_of(eye: Eye, rows: slice) -> Callable[[Index], Bundle]:
         origins = np.repeat(eye.origin[None], len(xs), axis=0)
         boxed = Boxed(xs.astype(np.int32), ys.astype(np.int32), eye.boxes)
         rays = twofold_eye_rays(eye.raster, xs, ys)
-        return Bundle(origins, rays, boxed, lambda k: eye.raster.exact_direction(int(xs[k]), int(ys[k])))
+        return Bundle(origins, rays, boxed, lambda k: eye.raster.whole_direction(int(xs[k]), int(ys[k])))
 
     return rays_of
 
@@ -244,22 +243,31 @@ def _settle(hits: Hits, unsure: np.ndarray, rays_of: Callable[[Index], Bundle], 
     bundle, (centres, radii, on, path) = rays_of(pending), targets
     found = Nearest.nothing_yet(pending[0].shape)
     path.nearest_twofold(bundle.origins, bundle.rays, bundle.boxed, centres, radii, on, found)
-    for k in np.flatnonzero(found.unsure).tolist():
-        found.t[k], found.index[k] = _nearest_exactly(bundle, k, targets)
+    _settle_exactly(found, bundle, targets)
     hits.t[pending], hits.index[pending] = found.t, found.index
 
 
-def _nearest_exactly(bundle: Bundle, k: int, targets: Targets) -> tuple[float, int]:
-    """Ray k against all spheres that float64 cannot rule out, in integers."""
-    origin, centres, radii = bundle.origins[k], targets.centres, targets.radii
-    ray = (bundle.rays.x[k], bundle.rays.y[k], bundle.rays.z[k])
-    square = np.float64(ray[0] * ray[0] + ray[1] * ray[1] + ray[2] * ray[2])
-    seen = look(*vector(origin), *xyz(centres), radii)
-    t, error, low = meet(*seen, radii, *ray, square, bundle.rays.reach[k])
-    candidates = np.flatnonzero(contends(t, error, low, (t + error).min(), 0.0))
-    spheres = [(centres[i].tolist(), float(radii[i])) for i in candidates]
-    t_exact, index = exact.nearest_hit(vector(origin), bundle.exact_direction(k), spheres)
-    return t_exact, int(candidates[index]) if index >= 0 else -1
+def _settle_exactly(found: Nearest, bundle: Bundle, targets: Targets) -> None:
+    """Decide what two-fold arithmetic left open, in integers, among the spheres that float64 cannot rule out."""
+    open_rays = np.flatnonzero(found.unsure)
+    at_once = max(1, _CHUNK // max(1, len(targets.radii)))
+    for start in range(0, len(open_rays), at_once):
+        some = open_rays[start : start + at_once]
+        for k, contend in zip(some.tolist(), _contenders(bundle, some, targets), strict=True):
+            which = np.flatnonzero(contend)
+            spheres = zip(targets.centres[which].tolist(), targets.radii[which].tolist(), strict=True)
+            direction, unit = bundle.exact_direction(k)
+            found.t[k], i = exact.nearest_hit(bundle.origins[k].tolist(), direction, spheres, unit)
+            found.index[k] = which[i] if i >= 0 else -1
+
+
+def _contenders(bundle: Bundle, rays: np.ndarray, targets: Targets) -> np.ndarray:
+    """Which spheres float64 cannot rule out for these rays: bool (rays, s)."""
+    x, y, z, reach = (component[rays, None] for component in bundle.rays[:3] + bundle.rays[-1:])
+    ox, oy, oz = (component[:, None] for component in xyz(bundle.origins[rays]))
+    seen = look(ox, oy, oz, *xyz(targets.centres), targets.radii)
+    t, error, low = meet(*seen, targets.radii, x, y, z, x * x + y * y + z * z, reach)
+    return np.asarray(contends(t, error, low, (t + error).min(axis=1, keepdims=True), 0.0))
 
 
 def _polish(hits: Hits, rays_of: Callable[[Index], Bundle], targets: Targets) -> None:

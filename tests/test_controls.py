@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from raytracer import STAGES
+from raytracer import METHODS, STAGES
 from sketch.controls import KEYS, SCENE_KEYS, View, click, keys_as_markdown, press
 
 SCENES = tuple(Path(f"{n:02}.cli") for n in range(1, 15))
@@ -21,6 +21,7 @@ def is_valid(view: View) -> bool:
     return (
         view.scene in view.scenes
         and view.stage in STAGES
+        and view.method in METHODS
         and view.readings >= 0
         and view.wish in ("", "save", "quit")
         and "\n" not in view.note
@@ -71,6 +72,32 @@ def test_tab_goes_through_all_stages():
         seen.append(view.stage)
     assert sorted(seen) == sorted(STAGES)
     assert view.stage == VIEW.stage
+
+
+def test_m_goes_through_all_methods_and_capital_m_back():
+    view, seen = VIEW, []
+    for _ in METHODS:
+        seen.append(view.method)
+        view = press(view, "m")
+        assert press(view, "M").method == seen[-1]
+    assert seen == list(METHODS)
+    assert seen[0] == "certified"
+    assert view == VIEW
+    assert press(VIEW, "M").method == list(METHODS)[-1]
+
+
+def test_a_stage_leaves_the_method_and_a_method_the_stage():
+    after = press(press(press(VIEW, "x"), "m"), "]")
+    assert (after.stage, after.method, after.place) == ("error", list(METHODS)[1], 1)
+    assert press(after, "n").method == after.method
+
+
+def test_l_hides_the_legend_and_shows_it_where_there_is_one():
+    hidden = press(press(VIEW, "x"), "l")
+    assert not hidden.legend
+    assert press(hidden, "l").legend
+    assert press(VIEW, "l").legend
+    assert press(VIEW, "l").note == "stage diffuse has no legend"
 
 
 def test_capital_letters_do_what_small_ones_do():

@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from raytracer import STAGES, interpreter, load_png, render_scene
+from raytracer import METHODS, STAGES, interpreter, load_png, render_scene
+from sketch import __main__ as sketch_main
 from sketch import display, java
 from sketch.files import save_beside
 from sketch.scenes import NoScenesError, find_scenes
@@ -96,12 +97,21 @@ def test_the_sheet_holds_every_picture_and_the_messages(folder):
 
 
 @pytest.mark.parametrize(
-    "arguments", [["--size", "0"], ["--size", "1e3"], ["--size", "99999"], ["--stage", "hitt"], ["a", "b"], ["--wrong"]]
+    "arguments", ["--size 0", "--size 1e3", "--size 99999", "--stage hitt", "--method hitt", "a b", "--wrong"]
 )
 def test_wrong_arguments(tmp_path, arguments):
-    done = sketch(tmp_path, *arguments)
+    done = sketch(tmp_path, *arguments.split())
     assert done.returncode == 2
     assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_any_method_can_be_the_first(folder, monkeypatch, method):
+    opened = []
+    monkeypatch.setattr(sketch_main, "why_no_window", lambda: "")
+    monkeypatch.setattr(sketch_main, "open_window", lambda view, size: opened.append(view) or 0)
+    assert sketch_main.main([str(folder), "--method", method, "--stage", "error"]) == 0
+    assert [(view.method, view.stage) for view in opened] == [(method, "error")]
 
 
 @pytest.mark.parametrize("where", ["nowhere", "empty", "my scenes/notes.txt", "my scenes/scene3.cli"])
