@@ -49,6 +49,8 @@ class Material:
 
 @dataclass(frozen=True)
 class Sphere:
+    """Radius and centre in the scene's unit of length; the radius is above 0."""
+
     radius: float
     centre: Vector
     material: Material
@@ -56,6 +58,8 @@ class Sphere:
 
 @dataclass(frozen=True)
 class Triangle:
+    """Three vertices that do not lie on one line, in the scene's unit of length."""
+
     vertices: tuple[Vector, Vector, Vector]
     material: Material
 

@@ -97,10 +97,12 @@ class Whole:
 
 
 def hit(block: Block) -> np.ndarray:
+    """One dummy colour wherever anything is hit."""
     return block.paint(DUMMY, elsewhere=block.scene.background)
 
 
 def outline(block: Block) -> np.ndarray:
+    """Black wherever anything is hit; a background that is too dark for that to be seen gives way to white."""
     dark = max(block.scene.background) <= _TOO_DARK
     return block.paint(BLACK, elsewhere=WHITE if dark else block.scene.background)
 
@@ -115,6 +117,7 @@ def diffuse(block: Block) -> np.ndarray:
 
 
 def normal(block: Block) -> np.ndarray:
+    """Each component of N from −1…1 to 0…1."""
     return block.paint((block.normals + 1.0) / 2.0, elsewhere=BLACK)
 
 
