@@ -16,7 +16,7 @@ from raytracer import plain
 _PRICE = 0.5  # seconds to load the compiler and what it has compiled before
 _SECONDS_A_TEST, _SECONDS_A_LOOP = 1e-7, 3e-4  # numpy: a ray against a sphere; a sphere against a block of rays
 
-_lock = Lock()
+_loading, _counting = Lock(), Lock()
 _loaded: ModuleType | None = None
 _spent = 0.0
 _fault = ""
@@ -30,7 +30,7 @@ def why_no_compiler() -> str:
 def load() -> ModuleType:
     """The compiled path, loaded if it was not; the numpy path where the compiler cannot be loaded."""
     global _loaded, _fault
-    with _lock:
+    with _loading:
         if _loaded is None:
             try:
                 _loaded = _import_kernels()
@@ -43,7 +43,7 @@ def choose(tests: int, loops: int) -> ModuleType:
     """The path for so many tests of a ray against a sphere, in so many loops over rays."""
     global _spent
     seconds = tests * _SECONDS_A_TEST + loops * _SECONDS_A_LOOP
-    with _lock:
+    with _counting:
         rent = _loaded is None and _spent + seconds <= _PRICE
         if rent:
             _spent += seconds

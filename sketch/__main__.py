@@ -9,7 +9,8 @@ from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
 
-from raytracer import STAGES, save_png
+from raytracer import METHODS, STAGES, save_png
+from raytracer.methods import CERTIFIED
 from sketch import display, java
 from sketch.controls import View, keys_as_markdown
 from sketch.files import save_beside
@@ -39,7 +40,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except NoScenesError as error:
         print(error, file=sys.stderr)
         return 1
-    return open_window(View(scenes, place, options.stage), options.size or SIZE)
+    return open_window(View(scenes, place, options.stage, options.method), options.size or SIZE)
 
 
 def why_no_window() -> str:
@@ -109,6 +110,7 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     )  # fmt: skip
     parser.add_argument("--size", metavar="N", type=_size, help=f"draw N × N pixels (default: {SIZE})")
     parser.add_argument("--stage", choices=STAGES, default="diffuse", help="the stage to begin with")
+    parser.add_argument("--method", choices=METHODS, default=CERTIFIED, help="the method to begin with")
     parser.add_argument("--sheet", metavar="OUT.png", type=Path, help="draw every scene at every stage into one PNG")
     parser.add_argument("--versions", action="store_true", help="print which Java is used, and why, and all versions")
     parser.add_argument("--keys", action="store_true", help="print what the keys do, as a markdown table")

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
-from raytracer import STAGES
+from raytracer import METHODS, STAGES
+from raytracer.methods import CERTIFIED
 
 SCENE_KEYS = "1234567890-"
 
@@ -19,9 +20,11 @@ class View:
     scenes: tuple[Path, ...]  # of the folder, in the order in which keys count them
     place: int = 0  # which of them
     stage: str = "diffuse"
+    method: str = CERTIFIED
     readings: int = 0  # how often the user has asked for the files to be read again
     pixel: tuple[int, int] | None = None  # column and row whose story is told
     help: bool = False
+    legend: bool = True  # of a stage that has one
     note: str = ""  # the answer to the last key
     wish: str = ""  # what the last key wants done beside showing something: "save", "quit" or nothing
 
@@ -61,6 +64,18 @@ def to_next_stage(view: View, key: str) -> View:
     return replace(view, stage=names[(names.index(view.stage) + 1) % len(names)])
 
 
+def to_next_method(view: View, key: str) -> View:
+    """The method after this one, or before it; beyond the last comes the first."""
+    names, step = list(METHODS), 1 if key == "m" else -1
+    return replace(view, method=names[(names.index(view.method) + step) % len(names)])
+
+
+def show_legend(view: View, key: str) -> View:
+    if STAGES[view.stage].legend:
+        return replace(view, legend=not view.legend)
+    return replace(view, note=f"stage {view.stage} has no legend")
+
+
 def read_again(view: View, key: str) -> View:
     return replace(view, readings=view.readings + 1)
 
@@ -82,6 +97,8 @@ KEYS = (
     Key("[]", "[ and ]", "the scene before, the scene after", to_next_scene),
     *(Key(stage.key, stage.key, f"{name}: {stage.about}", to_stage) for name, stage in STAGES.items()),
     Key("\t", "Tab", "the next stage", to_next_stage),
+    Key("mM", "m", "the next method; M the one before", to_next_method),
+    Key("l", "l", "hide the legend, or show it", show_legend),
     Key("r", "r", "read the scene's file again", read_again),
     Key("s", "s", "save the picture as a PNG", save),
     Key("?", "?", "show these keys, or hide them", show_help),

@@ -16,6 +16,9 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
+from raytracer import METHODS
+from raytracer.image import to_bytes
+from raytracer.methods import CERTIFIED
 from sketch.controls import KEYS, View
 from sketch.worker import Drawing
 
@@ -25,12 +28,13 @@ MARGIN = 10
 
 BACKDROP = (24, 25, 29)
 BRIGHT, DIM, AMBER = (236, 238, 242), (150, 156, 168), (255, 196, 92)
-PANEL = (18, 20, 26, 232)
+PANEL, LEGEND = (18, 20, 26, 232), (18, 20, 26, 168)
 
 _LONGEST = 2000  # characters of a text
 _REACH = 5  # pixels from a marked pixel to the mark around it
 
 Colour = tuple[int, int, int]
+Legend = tuple[tuple[tuple[float, float, float], str], ...]  # as a stage has it
 
 
 @dataclass(frozen=True)
@@ -82,20 +86,36 @@ class Status:
 
 
 def status(view: View, drawing: Drawing | None, size: int) -> Status:
-    """What the two lines say: scene, stage, size, milliseconds; below, the answer to the last key, or warnings."""
-    current = drawing is not None and (drawing.request.path, drawing.request.stage) == (view.scene, view.stage)
-    if drawing is None or not current or not (drawing.scene or drawing.error):
+    """What the two lines say; the first one: scene, stage, method unless it is the certain one, size, milliseconds."""
+    if drawing is not None and not _answers(drawing, view):
+        drawing = None
+    if drawing is None or not (drawing.scene or drawing.error):
         time = "reading"
     elif drawing.error:
         time = "not drawn"
     else:
         time = f"{drawing.milliseconds:.1f} ms" if drawing.whole else f"drawing, {drawing.done:.0%}"
-    figures = f"{view.place + 1} of {len(view.scenes)} · {view.stage} · {size} × {size} · {time}"
+    how = view.stage if view.method == CERTIFIED else f"{view.stage} · {view.method}"
+    figures = f"{view.place + 1} of {len(view.scenes)} · {how} · {size} × {size} · {time}"
+    return Status(view.scene.stem, figures, *_remark(view, drawing))
+
+
+def _answers(drawing: Drawing, view: View) -> bool:
+    """Whether a drawing is of what the view is of."""
+    request = drawing.request
+    return (request.path, request.stage, request.method) == (view.scene, view.stage, view.method)
+
+
+def _remark(view: View, drawing: Drawing | None) -> tuple[str, Colour]:
+    """The second line: the answer to the last key, else warnings and wrong pixels, else what the method is."""
     if view.note:
-        return Status(view.scene.stem, figures, view.note, BRIGHT)
-    if drawing is not None and current and drawing.warnings:
-        return Status(view.scene.stem, figures, "; ".join(drawing.warnings), AMBER)
-    return Status(view.scene.stem, figures, "? shows the keys")
+        return view.note, BRIGHT
+    if drawing is not None and (drawing.wrong or drawing.warnings):
+        wrong = [f"{drawing.wrong:,} of {drawing.picture[..., 0].size:,} pixels are wrong"] if drawing.wrong else []
+        return "; ".join([*wrong, *drawing.warnings]), AMBER
+    if drawing is not None and drawing.wrong == 0:
+        return "no pixel is wrong", DIM
+    return "? shows the keys" if view.method == CERTIFIED else f"{view.method}: {METHODS[view.method].about}", DIM
 
 
 def help_panel() -> Panel:
@@ -117,6 +137,7 @@ def compose(
     status: Status,
     panel: Panel | None = None,
     mark: tuple[int, int] | None = None,
+    legend: Legend = (),
 ) -> np.ndarray:
     """The whole window: uint8 (height, width, 3). `mark` is the pixel that the panel is about."""
     frame = np.empty((layout.height, layout.width, 3), np.uint8)
@@ -127,6 +148,9 @@ def compose(
     place = None if mark is None else (mark[0] + corner, mark[1] + corner)
     if place is not None:
         _frame_pixel(canvas, *place)
+    if legend:
+        box = _legend(legend, layout.side)
+        _blend(canvas, box, MARGIN, layout.side - MARGIN - len(box))
     if panel is not None:
         _lay_over(canvas, panel, None if place is None else place[1])
     return frame
@@ -142,7 +166,7 @@ def _frame_pixel(canvas: np.ndarray, x: int, y: int) -> None:
 
 
 def _lay_over(canvas: np.ndarray, panel: Panel, row: int | None) -> None:
-    """Blend a panel into the canvas: in its middle, or above or below the row that is to stay seen."""
+    """Lay a panel over the canvas: in its middle, or above or below the row that is to stay seen."""
     side = len(canvas)
     room = side if row is None else max(row, side - row) - _REACH
     text = _panel(panel, side - 2 * MARGIN, room - 2 * MARGIN)
@@ -150,9 +174,14 @@ def _lay_over(canvas: np.ndarray, panel: Panel, row: int | None) -> None:
     left, top = (side - width) // 2, (side - height) // 2
     if row is not None:
         top = MARGIN if row > side // 2 else side - height - MARGIN
-    under = canvas[top : top + height, left : left + width]
-    opacity = text[..., 3:] / np.float32(255)
-    under[:] = under * (1 - opacity) + text[..., :3] * opacity + 0.5
+    _blend(canvas, text, left, top)
+
+
+def _blend(canvas: np.ndarray, over: np.ndarray, left: int, top: int) -> None:
+    """Lay an RGBA image over the canvas."""
+    under = canvas[top : top + over.shape[0], left : left + over.shape[1]]
+    opacity = over[..., 3:] / np.float32(255)
+    under[:] = under * (1 - opacity) + over[..., :3] * opacity + 0.5
 
 
 @lru_cache(maxsize=16)
@@ -178,6 +207,23 @@ def _panel(panel: Panel, width: int, height: int) -> np.ndarray:
         if image.height <= height:
             break
     return np.asarray(image)[: max(height, SMALLEST // 2)]
+
+
+@lru_cache(maxsize=16)
+def _legend(legend: Legend, side: int) -> np.ndarray:
+    """What colours mean, as small as it can be read: the picture is what matters; RGBA."""
+    size = 10 if side < 480 else 12
+    pad, leading, swatch = size // 2, round(1.2 * size), size - 2
+    width = min(side - 2 * MARGIN, round(3 * pad + swatch + max(_length(text, size) for _, text in legend)))
+    image = Image.new("RGBA", (width, 2 * pad + leading * len(legend)), LEGEND)
+    draw = ImageDraw.Draw(image)
+    for row, (colour, text) in enumerate(legend):
+        y = pad + leading * row
+        box = (pad, y + 2, pad + swatch - 1, y + swatch + 1)
+        draw.rectangle(box, (*to_bytes(np.array(colour)).tolist(), 255), outline=(*DIM, 255))
+        left = 2 * pad + swatch
+        draw.text((left, y), shortened(text, size, width - pad - left), BRIGHT, font(size))
+    return np.asarray(image)[: side - 2 * MARGIN]
 
 
 def _typeset(panel: Panel, size: int, room: int) -> Image.Image:

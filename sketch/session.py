@@ -10,11 +10,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from raytracer import SceneError, interpreter, probe_pixel, render_scene
+from raytracer import STAGES, SceneError, interpreter, probe_pixel, render_scene
+from raytracer.methods import CERTIFIED
 from sketch import controls
 from sketch.controls import View
 from sketch.files import save_beside
-from sketch.overlay import Layout, Panel, compose, error_panel, help_panel, status, story_panel
+from sketch.overlay import Layout, Legend, Panel, compose, error_panel, help_panel, status, story_panel
 from sketch.worker import BLANK, Drawing, Renderer, Request
 
 _PATIENCE = 5.0  # seconds that the end waits for a picture to be saved
@@ -56,7 +57,13 @@ class Session:
         """All that the window shows: uint8 (height, width, 3)."""
         view, drawing, size = self._view, self._renderer.drawing, self.layout.size
         picture = np.full((size, size, 3), BLANK, np.uint8) if drawing is None else drawing.picture
-        return compose(self.layout, picture, status(view, drawing, size), self._panel(view, drawing), view.pixel)
+        panel = self._panel(view, drawing)
+        legend = () if panel is not None else self._legend(view, drawing)
+        return compose(self.layout, picture, status(view, drawing, size), panel, view.pixel, legend)
+
+    def was_shown(self) -> None:
+        """The content has been shown: now there is time to get ready for what comes next."""
+        self._renderer.get_faster()
 
     def close(self) -> None:
         """End all work. Pictures that are being saved are finished first, unless that takes too long."""
@@ -80,7 +87,7 @@ class Session:
         self.changed()
 
     def _request(self, view: View) -> Request:
-        return Request(view.scene, view.stage, self.layout.size, view.readings)
+        return Request(view.scene, view.stage, self.layout.size, view.method, view.readings)
 
     def _panel(self, view: View, drawing: Drawing | None) -> Panel | None:
         """What lies over the picture."""
@@ -91,6 +98,11 @@ class Session:
         if drawing is not None and drawing.error:
             return error_panel(drawing.request.path, drawing.error)
         return None
+
+    @staticmethod
+    def _legend(view: View, drawing: Drawing | None) -> Legend:
+        """What the colours of the picture mean, if its stage says so."""
+        return STAGES[drawing.request.stage].legend if view.legend and drawing is not None else ()
 
     # Chores have a thread of their own, so that no handler waits for them.
 
@@ -115,7 +127,8 @@ class Session:
             return "there is no picture yet"
         if pixel is not None and pixel == self._view.pixel:  # else another click or key has come since
             request = drawing.request
-            lines = probe_pixel(drawing.scene, *pixel, request.size, request.size, request.stage).lines()
+            size, stage, method = request.size, request.stage, request.method
+            lines = probe_pixel(drawing.scene, *pixel, size, size, stage, method=method).lines()
             self._story = pixel, tuple(lines)
             print(*lines, sep="\n", flush=True)  # noqa: T201 (a click prints)
         return ""
@@ -131,10 +144,17 @@ class Session:
         if seen is not None and seen.whole and seen.request == request:
             picture = seen.picture
         else:  # not finished, or given up for the next one
-            picture = render_scene(interpreter(request.path), request.stage, request.size, request.size)
-        return f"saved {save_beside(f'{request.path.stem}-{request.stage}', picture)}"
+            size, scene = request.size, interpreter(request.path)
+            picture = render_scene(scene, request.stage, size, size, method=request.method)
+        return f"saved {save_beside(_file_name(request), picture)}"
 
     def _seen(self) -> Drawing | None:
         """Whose picture is seen: under the message about a broken scene, still that of the one before."""
         latest = self._renderer.drawing
         return self._renderer.whole if latest is not None and latest.error else latest
+
+
+def _file_name(request: Request) -> str:
+    """What a saved picture is called, without .png."""
+    method = () if request.method == CERTIFIED else (request.method,)
+    return "-".join([request.path.stem, request.stage, *method])

@@ -74,6 +74,7 @@ class Window(py5.Sketch):  # type: ignore[misc] # py5 has no types
             raise self.session.failure
         self.create_image_from_numpy(self.session.content(), "RGB", dst=self.shown)
         self.image(self.shown, 0, 0)
+        self.session.was_shown()
 
     @guarded
     def key_pressed(self) -> None:

@@ -6,12 +6,17 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 
-from raytracer import Cancelled, Scene, SceneError, interpreter, make_plan
+from raytracer import Cancelled, Scene, SceneError, backend, interpreter, make_plan
+from raytracer.image import to_bytes
+from raytracer.methods import CERTIFIED
 from raytracer.render import draw
+from raytracer.stages import FALSE_HIT, FALSE_MISS, WRONG_SHAPE
+from raytracer.trace import Eye
 
 BLANK = 40  # the grey of pixels that nothing was drawn on yet
 _PATIENCE = 1 / 30  # seconds between two looks at a picture that grows
@@ -24,6 +29,7 @@ class Request:
     path: Path
     stage: str
     size: int
+    method: str = CERTIFIED
     readings: int = 0  # another number means that the file is to be read again
 
 
@@ -36,6 +42,7 @@ class Drawing:
     scene: Scene | None = None  # None until the file is read, and when it cannot be
     done: float = 0.0  # the part of the picture that is drawn
     milliseconds: float = 0.0  # that drawing took
+    wrong: int | None = None  # pixels whose hit or shape is wrong; None where the stage does not tell
     warnings: tuple[str, ...] = ()
     error: str = ""  # what is wrong with the scene, in one line
 
@@ -58,6 +65,7 @@ class Renderer:
         self._read: tuple[Path, int, Scene] | None = None
         self._thread = threading.Thread(target=self._work, name="renderer", daemon=True)
         self._thread.start()
+        self._loader = threading.Thread(target=self._load, name="loader", daemon=True)
 
     def post(self, request: Request) -> None:
         """Ask for a picture; one that is being drawn is given up."""
@@ -71,6 +79,12 @@ class Renderer:
             self._closed = True
             self._news.notify()
 
+    def get_faster(self) -> None:
+        """Once there is a picture, load the compiled path for those to come. Nobody waits for it, not even the end."""
+        with self._news:
+            if self.whole is not None and self._loader.ident is None:
+                self._loader.start()
+
     def join(self, timeout: float | None = None) -> None:
         self._thread.join(timeout)
 
@@ -78,6 +92,14 @@ class Renderer:
         try:
             while (request := self._next()) is not None:
                 self._answer(request)
+        except BaseException as failure:
+            self.failure = failure
+            self._changed()
+
+    def _load(self) -> None:
+        try:
+            if self.whole is not None and bring_in_kernels(self.whole):
+                backend.load()
         except BaseException as failure:
             self.failure = failure
             self._changed()
@@ -103,7 +125,7 @@ class Renderer:
         request, looked = drawing.request, time.perf_counter()
         scene = self._scene(request)
         start = time.perf_counter()
-        plan = make_plan(scene, request.stage, request.size, request.size)
+        plan = make_plan(scene, request.stage, request.size, request.size, method=request.method)
         self.drawing = drawing = replace(drawing, scene=scene, warnings=plan.warnings)
 
         def progress(done: int, total: int, rows: slice) -> None:
@@ -116,7 +138,8 @@ class Renderer:
 
         draw(plan, out=drawing.picture, progress=progress, cancelled=self._superseded)
         elapsed = 1000 * (time.perf_counter() - start)
-        self.drawing = self.whole = replace(drawing, done=1.0, milliseconds=elapsed)
+        wrong = _count_wrong(drawing.picture) if request.stage == "error" else None
+        self.drawing = self.whole = replace(drawing, done=1.0, milliseconds=elapsed, wrong=wrong)
 
     def _superseded(self) -> bool:
         return self._closed or self._wanted is not None
@@ -132,3 +155,32 @@ class Renderer:
         if self.whole is not None and self.whole.request.size == size:
             return self.whole.picture.copy()
         return np.full((size, size, 3), BLANK, np.uint8)
+
+
+def bring_in_kernels(seen: Drawing) -> bool:
+    """Draw a few pixels of what is seen with the compiled kernels, so that their machine code is there, found or made.
+
+    To make it takes seconds, once; so the backend learns of the kernels only afterwards, and draws without them in the
+    meantime. False: there is no compiler.
+    """
+    try:
+        kernels = import_module("raytracer.kernels")
+    except ImportError:
+        return False
+
+    def compiled(eye: Eye) -> Eye:
+        kernels.see(eye.origin, eye.targets.centres, eye.targets.radii)
+        return eye._replace(targets=eye.targets._replace(path=kernels))
+
+    assert seen.scene is not None
+    plan = make_plan(seen.scene, seen.request.stage, 8, 8, method=seen.request.method)
+    draw(replace(plan, eye=compiled(plan.eye), truth=plan.truth and compiled(plan.truth)))
+    return True
+
+
+def _count_wrong(picture: np.ndarray) -> int:
+    """How many pixels of a picture at stage `error` have a colour that says wrong."""
+    return sum(
+        int(np.logical_and.reduce([picture[..., k] == byte for k, byte in enumerate(to_bytes(np.array(colour)))]).sum())
+        for colour in (WRONG_SHAPE, FALSE_HIT, FALSE_MISS)
+    )

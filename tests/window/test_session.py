@@ -9,13 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from raytracer import interpreter, load_png, render_scene
+from raytracer import METHODS, STAGES, eye_hits, interpreter, load_png, probe_pixel, render_scene
 from sketch.controls import View
-from sketch.overlay import STRIP, Layout, Panel, Status, compose, help_panel
+from sketch.overlay import MARGIN, SMALLEST, STRIP, Layout, Panel, Status, _length, compose, help_panel, status
 from sketch.session import Session
+from sketch.worker import Drawing, Request
 
 SPHERE = "surface 1 0 0  0 0 0  0 0 0  1 0\nlight 0 5 5  1 1 1\nsphere 1 0 0 -4\n"
 SIZE = 330
+FAR = Path(__file__).resolve().parent.parent.parent / "scenes" / "hard" / "01_far_small_sphere.cli"
 
 
 @pytest.fixture
@@ -42,8 +44,8 @@ def wait_until(happened: Callable[[], object]) -> None:
         time.sleep(0.005)
 
 
-def expected(path: Path, stage: str = "diffuse") -> np.ndarray:
-    return render_scene(interpreter(path), stage, SIZE, SIZE)
+def expected(path: Path, stage: str = "diffuse", method: str = "certified") -> np.ndarray:
+    return render_scene(interpreter(path), stage, SIZE, SIZE, method=method)
 
 
 def shows(session: Session, picture: np.ndarray) -> bool:
@@ -58,6 +60,85 @@ def test_keys_change_what_is_seen(session, scenes):
     assert not session.wants_to_quit
     session.press("\x1b")
     assert session.wants_to_quit
+
+
+def test_m_shows_what_the_method_draws(scenes):
+    session = Session(View((FAR,)), SIZE)
+    seen = set()
+    for method in METHODS:
+        picture = expected(FAR, method=method)
+        wait_until(lambda picture=picture: shows(session, picture))
+        seen.add(picture.tobytes())
+        session.press("m")
+    wait_until(lambda: shows(session, expected(FAR)))
+    session.press("M")
+    wait_until(lambda: shows(session, expected(FAR, method=list(METHODS)[-1])))
+    assert len(seen) > 2
+    session.close()
+
+
+def test_the_legend_hides_a_corner_and_l_hides_the_legend(scenes):
+    picture = expected(FAR, "error", "textbook")
+    session = Session(View((FAR,), stage="error", method="textbook"), SIZE)
+    wait_until(lambda: session._renderer.whole)
+    rows, columns = np.nonzero((session.content()[:SIZE] != picture).any(axis=2))
+    assert rows.min() > SIZE / 2
+    assert columns.max() < SIZE / 2
+    assert 0.05 < np.ptp(rows) * np.ptp(columns) / SIZE**2 < 0.2
+    session.press("l")
+    assert shows(session, picture)
+    session.press("l")
+    assert not shows(session, picture)
+    session.press("?")
+    help_alone = compose(Layout(SIZE), picture, Status("", "", ""), help_panel())
+    assert shows(session, help_alone[:SIZE])
+    session.close()
+
+
+def test_the_status_counts_the_wrong_pixels(scenes):
+    scene = interpreter(FAR)
+    found, true = eye_hits(scene, SIZE, SIZE, method="textbook"), eye_hits(scene, SIZE, SIZE)
+    wrong = int((found.index != true.index).sum())
+    assert wrong > 1000
+    session = Session(View((FAR,), stage="error", method="textbook"), SIZE)
+    for key, remark in (("x", f"{wrong:,} of {SIZE * SIZE:,} pixels are wrong"), ("M", "no pixel is wrong")):
+        session.press(key)
+        wait_until(lambda: is_answered(session))
+        assert status(session._view, session._renderer.drawing, SIZE).remark == remark
+    session.close()
+
+
+def is_answered(session: Session) -> bool:
+    drawing = session._renderer.drawing
+    return drawing is not None and drawing.whole and drawing.request == session._request(session._view)
+
+
+def test_the_status_says_the_method_unless_it_is_the_certain_one():
+    drawing = Drawing(Request(FAR, "error", SMALLEST), np.zeros((SMALLEST, SMALLEST, 3), np.uint8))
+    plain = status(View((FAR,), stage="error"), drawing, SMALLEST)
+    assert "certified" not in plain.figures
+    other = status(View((FAR,), stage="error", method="half_b"), drawing, SMALLEST)
+    assert other.figures == "1 of 1 · error · half_b · 320 × 320 · reading"  # the drawing is not of this method
+    assert other.remark == f"half_b: {METHODS['half_b'].about}"
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_figures_fit_the_smallest_window(method):
+    views = [View((FAR,) * 11, 10, stage, method) for stage in STAGES]
+    for view in views:
+        picture = np.zeros((SMALLEST, SMALLEST, 3), np.uint8)
+        request = Request(FAR, view.stage, SMALLEST, method)
+        drawing = Drawing(request, picture, interpreter(FAR), done=1.0, milliseconds=1234.5)
+        assert _length(status(view, drawing, SMALLEST).figures, 12) < SMALLEST - 2 * MARGIN
+
+
+def test_saved_pictures_are_named_after_the_method(session, scenes, tmp_path):
+    for key in "1hsms":
+        session.press(key)
+    session.close()
+    method = list(METHODS)[1]
+    assert sorted(path.name for path in tmp_path.glob("*.png")) == [f"1-hit-{method}.png", "1-hit.png"]
+    assert np.array_equal(load_png(tmp_path / f"1-hit-{method}.png"), expected(scenes[0], "hit", method))
 
 
 def test_saving_waits_neither_for_the_picture_nor_loses_it(session, scenes, tmp_path):
@@ -106,6 +187,18 @@ def test_a_click_prints_the_story(session, scenes, capsys):
     assert session._view.pixel == (SIZE // 2, SIZE // 2)
 
 
+def test_a_click_tells_what_the_method_found(scenes, capsys):
+    found, true = (eye_hits(interpreter(FAR), SIZE, SIZE, method=method).index for method in ("textbook", "certified"))
+    y, x = map(int, np.argwhere((found >= 0) & (true < 0))[0])
+    session = Session(View((FAR,), method="textbook"), SIZE)
+    wait_until(lambda: session._renderer.whole)
+    session.click(x, y)
+    session.close()
+    story = probe_pixel(interpreter(FAR), x, y, SIZE, SIZE, method="textbook").lines()
+    assert capsys.readouterr().out.splitlines() == story
+    assert story != probe_pixel(interpreter(FAR), x, y, SIZE, SIZE).lines()
+
+
 @pytest.mark.parametrize("size", [1, 100, 320, 400])
 def test_the_layout_finds_pixels(size):
     layout = Layout(size)
@@ -128,3 +221,4 @@ def test_any_text_fits(size, mark):
     status = Status("name" * 99, "figures" * 99, "remark\n\udcff\0 × − …" * 99)
     for panel in (help_panel(), Panel("x" * 999, (("y" * 20, "word " * 999 + "z" * 9999),)), Panel("", (("", ""),))):
         compose(Layout(size), picture, status, panel, mark)
+    compose(Layout(size), picture, status, legend=(((1.0, 0.5, 0.0), "long " * 99),) * 99)

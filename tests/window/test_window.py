@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from window_driver import PROJECT, Sketch
 
-from raytracer import STAGES, interpreter, load_png, render_scene, save_png
+from raytracer import METHODS, STAGES, interpreter, load_png, render_scene, save_png
+from sketch.overlay import Layout, Status, compose
 
 SIZE = 330
 SPHERE = "surface 1 0 0  0 0 0  0 0 0  1 0\nlight 0 5 5  1 1 1\nsphere 1 0 0 -4\n"
@@ -56,7 +57,30 @@ def test_number_keys_show_scenes_byte_for_byte(sketch, expected):
 @pytest.mark.parametrize("stage", STAGES)
 def test_stage_keys_show_stages_byte_for_byte(sketch, expected, stage):
     sketch.press("2", STAGES[stage].key)
-    sketch.wait_for_picture(expected(NAMES[1], stage), stage)
+    sketch.wait_for_picture(under_legend(expected(NAMES[1], stage), stage), stage)
+
+
+def under_legend(picture: np.ndarray, stage: str) -> np.ndarray:
+    """The picture as the window shows it."""
+    return compose(Layout(SIZE), picture, Status("", "", ""), legend=STAGES[stage].legend)[:SIZE]
+
+
+def test_m_changes_the_method_and_the_picture_of_errors_answers(start):
+    path = PROJECT / "scenes" / "hard" / "01_far_small_sphere.cli"
+    sketch = start(path, "--size", SIZE, "--stage", "error", "--method", list(METHODS)[2])
+    seen, (certain, first, second, third) = set(), list(METHODS)[:4]
+    for keys, method in [("x", second), ("M", first), ("M", certain), ("mmm", third)]:
+        sketch.press(*keys)
+        picture = render_scene(interpreter(path), "error", SIZE, SIZE, method=method)
+        sketch.wait_for_picture(under_legend(picture, "error"), method)
+        seen.add(picture.tobytes())
+    assert len(seen) > 2
+    sketch.press("l")
+    sketch.wait_for_picture(picture, "the picture without the legend")
+    sketch.press("l")
+    sketch.wait_for_picture(under_legend(picture, "error"), "the legend again")
+    sketch.press("Escape")
+    assert sketch.end() == 0
 
 
 def test_tab_and_brackets(sketch, expected):
@@ -170,13 +194,27 @@ def test_a_broken_first_scene_opens_the_window_with_a_message(start, folder, exp
     assert "Traceback" not in sketch.stderr.read_text()
 
 
+def test_quitting_does_not_wait_for_the_compiler(start, folder):
+    endless = (
+        "import sys, time, sketch.worker, sketch.__main__\n"
+        "def load(seen): print('loading', flush=True); time.sleep(1000)\n"
+        "sketch.worker.bring_in_kernels = load\n"
+        "sys.exit(sketch.__main__.main())"
+    )
+    sketch = start(folder, "--size", 100, program=("-c", endless))
+    sketch.wait_until(lambda: sketch.stdout.read_text() == "loading\n", "the loading")
+    sketch.press("Escape")
+    assert sketch.end() == 0
+    assert sketch.stderr.read_text() == ""
+
+
 @pytest.mark.parametrize("method", ["sketch.session.Session.press", "sketch.session.probe_pixel"])
 def test_a_mistake_of_ours_ends_the_sketch_with_status_1(start, folder, method):
     """In a handler, and on the thread of the chores."""
     owner, name = method.rsplit(".", 1)
     sabotage = (
         "import sys, sketch.session, sketch.__main__\n"
-        "def broken(*anything): raise ZeroDivisionError('sabotage')\n"
+        "def broken(*anything, **more): raise ZeroDivisionError('sabotage')\n"
         f"{owner}.{name} = broken\n"
         "sys.exit(sketch.__main__.main())"
     )

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from importlib import import_module
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from raytracer import Cancelled, interpreter, render_scene
+from raytracer import METHODS, Cancelled, backend, eye_hits, interpreter, render_scene
 from sketch import worker
 from sketch.worker import Drawing, Renderer, Request
 
 SPHERE = "surface 1 0 0  0 0 0  0 0 0  1 0\nlight 0 5 5  1 1 1\nsphere 1 0 0 -4\n"
 SIZE = 50
+FAR = Path(__file__).resolve().parent.parent.parent / "scenes" / "hard" / "01_far_small_sphere.cli"
 
 
 @pytest.fixture
@@ -56,6 +60,15 @@ def test_it_draws_what_render_scene_draws(renderer, scene):
     assert np.array_equal(drawing.picture, render_scene(interpreter(scene), "diffuse", SIZE, SIZE))
     assert drawing.milliseconds > 0
     assert renderer.whole is drawing
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_it_draws_by_the_method_that_is_asked_for(renderer, method):
+    scene = interpreter(FAR)
+    drawing = answer(renderer, Request(FAR, "error", SIZE, method))
+    assert np.array_equal(drawing.picture, render_scene(scene, "error", SIZE, SIZE, method=method))
+    found, true = eye_hits(scene, SIZE, SIZE, method=method), eye_hits(scene, SIZE, SIZE)
+    assert drawing.wrong == (found.index != true.index).sum()
 
 
 def test_an_error_is_a_value_and_leaves_the_last_picture(renderer, scene, tmp_path):
@@ -133,6 +146,56 @@ def test_a_mistake_of_ours_is_kept_and_reported(scene, monkeypatch):
     renderer.post(Request(scene, "diffuse", SIZE))
     assert told.wait(10)
     assert isinstance(renderer.failure, ZeroDivisionError)
+
+
+def test_what_makes_it_faster_is_loaded_once_and_in_the_background(renderer, scene, monkeypatch):
+    loads, may_end = [], threading.Event()
+
+    def load_slowly():
+        loads.append(threading.current_thread())
+        assert may_end.wait(10)
+
+    monkeypatch.setattr(worker, "backend", SimpleNamespace(load=load_slowly))
+    monkeypatch.setattr(worker, "bring_in_kernels", lambda seen: True)
+    renderer.get_faster()  # too early
+    answer(renderer, Request(scene, "diffuse", SIZE))
+    assert loads == []
+    for _ in range(3):
+        renderer.get_faster()
+    wait_until(lambda: loads)
+    answer(renderer, Request(scene, "normal", SIZE))
+    assert len(loads) == 1
+    assert loads[0].daemon
+    may_end.set()
+    loads[0].join(10)
+    assert renderer.failure is None
+
+
+@pytest.mark.skipif(backend.why_no_compiler() != "", reason="numba is not installed")
+def test_the_kernels_that_are_brought_in_are_used_next(renderer, scene):
+    answer(renderer, Request(scene, "error", SIZE, "half_b"))
+    renderer.get_faster()
+    renderer._loader.join(60)
+    assert not renderer._loader.is_alive()
+    assert renderer.failure is None
+    drawing = answer(renderer, Request(scene, "depth", SIZE))
+    assert np.array_equal(drawing.picture, render_scene(interpreter(scene), "depth", SIZE, SIZE))
+    assert backend.load() is import_module("raytracer.kernels")
+
+
+def test_without_a_compiler_nothing_is_brought_in(renderer, scene, monkeypatch):
+    monkeypatch.setitem(sys.modules, "raytracer.kernels", None)  # importing it is an ImportError
+    assert not worker.bring_in_kernels(answer(renderer, Request(scene, "diffuse", SIZE)))
+
+
+def test_a_mistake_while_loading_is_kept_and_reported(renderer, scene, monkeypatch):
+    def broken(seen):
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(worker, "bring_in_kernels", broken)
+    answer(renderer, Request(scene, "diffuse", SIZE))
+    renderer.get_faster()
+    wait_until(lambda: isinstance(renderer.failure, ZeroDivisionError))
 
 
 def test_closing_ends_the_thread(renderer):
