@@ -75,6 +75,16 @@ def verify(arguments: argparse.Namespace) -> int:
     return status
 
 
+def chart(arguments: argparse.Namespace) -> int:
+    """Measure every method, speed against accuracy, and draw the charts: about two minutes."""
+    from raytracer.chart import chart as draw_charts  # loads matplotlib
+
+    with tqdm(bar_format="{desc}", leave=False, disable=None) as line:
+        for path in draw_charts(arguments.output, arguments.long, progress=line.set_description_str):
+            print(path)
+    return 0
+
+
 def _plan(arguments: argparse.Namespace) -> Plan:
     width, height = arguments.size
     return make_plan(interpreter(arguments.scene), arguments.stage, width, height, arguments.sampling, arguments.method)
@@ -137,6 +147,16 @@ COMMANDS: dict[str, tuple[Callable[[argparse.Namespace], int], tuple[Argument, .
             Argument(("y",), {"metavar": "Y", "type": int, "help": "its row, from the top, from 0"}),
             *_PICTURE,
             Argument(("--pytest",), {"action": "store_true", "help": "print the pixel as a test case instead"}),
+        ),
+    ),
+    "chart": (
+        chart,
+        (
+            Argument(
+                ("-o", "--output"),
+                {"metavar": "FOLDER", "type": Path, "default": Path("docs"), "help": "where to, default docs"},
+            ),
+            Argument(("--long",), {"action": "store_true", "help": "ten times the rays, and about ten times as long"}),
         ),
     ),
     "verify": (

@@ -121,16 +121,16 @@ class Session:
         self.changed()
 
     def _tell(self, pixel: tuple[int, int] | None) -> str:
-        """Print and show a pixel's story."""
+        """Print a pixel's story, and show it in short."""
         drawing = self._seen()
         if drawing is None or drawing.scene is None:
             return "there is no picture yet"
         if pixel is not None and pixel == self._view.pixel:  # else another click or key has come since
             request = drawing.request
             size, stage, method = request.size, request.stage, request.method
-            lines = probe_pixel(drawing.scene, *pixel, size, size, stage, method=method).lines()
-            self._story = pixel, tuple(lines)
-            print(*lines, sep="\n", flush=True)  # noqa: T201 (a click prints)
+            told = probe_pixel(drawing.scene, *pixel, size, size, stage, method=method)
+            self._story = pixel, tuple(told.lines())
+            print(*told.story(), sep="\n", flush=True)  # noqa: T201 (a click prints)
         return ""
 
     def _save(self, request: Request) -> str:
