@@ -194,9 +194,9 @@ def test_a_click_tells_what_the_method_found(scenes, capsys):
     wait_until(lambda: session._renderer.whole)
     session.click(x, y)
     session.close()
-    story = probe_pixel(interpreter(FAR), x, y, SIZE, SIZE, method="textbook").lines()
+    story = probe_pixel(interpreter(FAR), x, y, SIZE, SIZE, method="textbook").story()
     assert capsys.readouterr().out.splitlines() == story
-    assert story != probe_pixel(interpreter(FAR), x, y, SIZE, SIZE).lines()
+    assert story != probe_pixel(interpreter(FAR), x, y, SIZE, SIZE).story()
 
 
 @pytest.mark.parametrize("size", [1, 100, 320, 400])
