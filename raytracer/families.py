@@ -113,6 +113,11 @@ def sized(rng: np.random.Generator, level: float) -> Bundle:
     return _changed(ordinary(rng), length=10.0**level)
 
 
+def stepped(rng: np.random.Generator, level: float) -> Bundle:
+    """An ordinary bundle, its directions made 10**level times as long."""
+    return _changed(ordinary(rng), direction=10.0**level)
+
+
 def far_from_origin(rng: np.random.Generator) -> Bundle:
     bundle = ordinary(rng)
     shift = rng.uniform(-1, 1, 3) * 10.0 ** rng.uniform(6, 12)

@@ -191,6 +191,7 @@ class Limits:
     far: float | None = None  # distance / radius
     ground: float | None = None  # radius / height above the sphere
     size: float | None = None  # of all lengths, both up and down
+    step: float | None = None  # of the direction, both up and down
     apart: float | None = None  # two hits, by what part of the radius: the limit is the power of its inverse
 
 
@@ -218,8 +219,8 @@ _OGITA = "T. Ogita, S. Rump, S. Oishi, Accurate Sum and Dot Product, 2005"
 _JOLDES = "M. Joldes, J.-M. Muller, V. Popescu, ACM TOMS 44, 2017"
 _SINGLE = np.float32
 
-_DOUBLE = Limits(far=6, ground=11, size=140, apart=13)
-_FLOAT = Limits(far=2, ground=3, size=16, apart=4.5)
+_DOUBLE = Limits(far=6, ground=11, size=140, step=140, apart=13)
+_FLOAT = Limits(far=2, ground=3, size=16, step=16, apart=4.5)
 
 CERTIFIED = "certified"
 

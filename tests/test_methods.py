@@ -58,9 +58,16 @@ MAKERS = {
     "far": lambda rng, level: families.far_small(rng, level),
     "ground": lambda rng, level: families.ground(rng, level),
     "size": lambda rng, level: families.sized(rng, level),
+    "step": lambda rng, level: families.stepped(rng, level),
     "apart": lambda rng, level: families.shells(rng, level),
 }
-BEYOND = {"far": 3, "ground": 4, "size": 30, "apart": 2.6}  # how far above its limit a method must have failed
+BEYOND = {
+    "far": 3,
+    "ground": 4,
+    "size": 30,
+    "step": 30,
+    "apart": 2.6,
+}  # how far above its limit a method must have failed
 
 
 def mistakes(method, kind, level):
@@ -89,7 +96,7 @@ LIMITS = [
 
 @pytest.mark.parametrize(("method", "kind", "limit"), LIMITS)
 def test_a_method_is_right_up_to_its_limit_and_seen_to_fail_beyond(method, kind, limit):
-    signs = (1, -1) if kind == "size" else (1,)
+    signs = (1, -1) if kind in ("size", "step") else (1,)
     for sign in signs:
         for part in (0.5, 0.8, 1.0):
             assert mistakes(method, kind, sign * part * limit) == 0
