@@ -132,6 +132,11 @@ def meet(
     return verdict(t, h, c, disc, root, q, part, H_ERROR * (m * l), c_error, disc_error, limit)
 
 
+def passes(h: Number, a: Number, c: Number, c_error: Number, ml: Number, m: Number) -> Number:
+    """Whether the ray's line certainly misses the sphere: what is asked first, where many do."""
+    return h * h - a * c < -(DISC_ERROR * ml * ml + m * m * c_error)
+
+
 def distance(h: Number, a: Number, c: Number) -> Number:
     """t of a hit: the near root from outside, the far one from inside or from the sphere itself."""
     q = abs(h) + np.sqrt(abs(h * h - a * c))

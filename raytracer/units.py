@@ -23,11 +23,16 @@ def in_units(*lengths: np.ndarray) -> tuple[int, list[np.ndarray]]:
 
 
 def unit_directions(directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Exponents e (n,) and directions (n, 3) such that direction · 2ᵉ is the one given, and near 1 in length.
+    """Exponents e (n,) and directions (n, 3) such that direction · 2ᵉ is the one given.
 
-    A direction whose components differ so much that one would lose digits stays as it is, with e = 0.
+    All e are 0 if all directions are of usual size; else they come near 1 in length, but for those whose components
+    differ so much that one would lose digits: they stay as they are, with e = 0.
     """
-    exponents = np.frexp(np.abs(directions).max(axis=1, initial=0.0))[1]
+    x, y, z = np.abs(directions.T)
+    largest = np.maximum(np.maximum(x, y), z)
+    if ((largest > _TOO_SMALL) & (largest < _TOO_LARGE)).all():
+        return np.zeros(len(directions), np.int32), directions
+    exponents = np.frexp(largest)[1]
     scaled = np.ldexp(directions, -exponents[:, None])
     exact = (np.ldexp(scaled, exponents[:, None]) == directions).all(axis=1)
     return np.where(exact, exponents, 0), np.where(exact[:, None], scaled, directions)

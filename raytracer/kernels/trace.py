@@ -16,6 +16,7 @@ from raytracer.certified import (
     meet,
     meet_twofold,
     nearer,
+    passes,
     rim_of,
 )
 from raytracer.kernels.compiler import compiled
@@ -120,6 +121,9 @@ def nearest_given(origins, rays, centres, radii, nearest):
         for i in range(len(radii)):
             cx, cy, cz = centres[i, 0], centres[i, 1], centres[i, 2]
             lx, ly, lz, c, c_error, size = look(ox, oy, oz, cx, cy, cz, radii[i])
+            h = rays.x[k] * lx + rays.y[k] * ly + rays.z[k] * lz
+            if passes(h, rays.square[k], c, c_error, rays.reach[k] * size, rays.reach[k]):
+                continue
             t, error, low = meet(
                 lx, ly, lz, c, c_error, size, radii[i],
                 rays.x[k], rays.y[k], rays.z[k], rays.square[k], rays.reach[k], T_TOLERANCE,
