@@ -67,6 +67,18 @@ class Boxed(NamedTuple):
     boxes: np.ndarray  # int32 (s, 4), left, right, top, bottom of each sphere, right and bottom excluded
 
 
+class Sides(NamedTuple):
+    """What is known of c = L·L − r² from integers: arrays of shape (spheres,). c is NaN where nothing is."""
+
+    c: np.ndarray
+    c_low: np.ndarray
+    c_error: np.ndarray  # 0 where c is exactly 0: the origin lies on the sphere
+
+    @classmethod
+    def unknown(cls, spheres: int) -> Sides:
+        return cls(np.full(spheres, np.nan), np.zeros(spheres), np.zeros(spheres))
+
+
 class Seen(NamedTuple):
     """Spheres as seen from one origin: arrays of shape (spheres,)."""
 

@@ -24,8 +24,7 @@ def screen_boxes(raster: Raster, eye: np.ndarray, centres: np.ndarray, radii: np
     """Boxes that hold every pixel whose ray may hit: int32 (s, 4), left, right, top, bottom, ends excluded.
 
     The eye (3,), the centres (s, 3) and the radii (s,) are in one unit of length, of anyone's choice. A sphere behind
-    the eye has an empty box, one around the eye or beside it that of the whole picture, as has one whose numbers are
-    too large or too small to be squared.
+    the eye has an empty box, one around the eye or beside it that of the whole picture.
     """
     width, height = raster.width, raster.height
     whole = np.broadcast_to(np.array([0, width, 0, height], np.int32), (len(radii), 4))
@@ -33,12 +32,15 @@ def screen_boxes(raster: Raster, eye: np.ndarray, centres: np.ndarray, radii: np
     if n is None:
         return np.ascontiguousarray(whole)
     with np.errstate(all="ignore"):
-        x, y, z = n @ (centres - eye).T
+        n, e = _without_powers_of_two(n)
+        lengths, _ = _without_powers_of_two(np.column_stack([centres - eye, radii]))
+        radii = lengths[:, 3]
+        x, y, z = n @ lengths[:, :3].T
         r2 = radii * radii
         k33 = z * z - r2 * (n[2] @ n[2])
         apart = k33 > _CROSSES * (z * z + r2 * (n[2] @ n[2]))
-        left, right = _range(x, z, radii, n[0], n[2], k33)
-        bottom, top = _range(y, z, radii, n[1], n[2], k33)
+        left, right = np.ldexp(_range(x, z, radii, n[0], n[2], k33), e[0] - e[2])
+        bottom, top = np.ldexp(_range(y, z, radii, n[1], n[2], k33), e[1] - e[2])
         # U = (2x − W) / H and V = (H − 2y) / H, solved for x and y
         first = np.stack([(left * height + width) / 2, (1 - top) * height / 2])
         last = np.stack([(right * height + width) / 2, (1 - bottom) * height / 2])
@@ -48,6 +50,12 @@ def screen_boxes(raster: Raster, eye: np.ndarray, centres: np.ndarray, radii: np
         known = apart & np.isfinite(box).all(axis=1)
         box = np.where((known & (z > 0))[:, None], box, 0)
     return np.where(known[:, None], box, whole).astype(np.int32)
+
+
+def _without_powers_of_two(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rows whose largest component is near 1, so that their squares are in range, and the exponents taken out."""
+    exponents = np.frexp(np.abs(rows).max(axis=1, initial=0.0))[1]
+    return np.ldexp(rows, -exponents[:, None]), exponents
 
 
 def _range(

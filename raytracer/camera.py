@@ -207,7 +207,10 @@ def spread(raster: Raster) -> float:
     """
     n = inverse_frame(raster.camera)
     reach = eye_grid(raster, slice(0, raster.height)).reach.max()
-    return float(reach * np.linalg.norm(n[2])) if n is not None and np.isfinite(reach) else inf
+    if n is None or not np.isfinite(reach):
+        return inf
+    largest = np.abs(n[2]).max()
+    return float(reach * largest * np.linalg.norm(n[2] / largest))
 
 
 def _square(x: Number, y: Number, z: Number) -> Number:

@@ -63,6 +63,9 @@ H_ERROR_2 = A_ERROR_2 = 2.0**-100
 C_ERROR_2 = 2.0**-102
 DISC_ERROR_2 = 2.0**-98
 
+# Closer to a sphere than this part of l², its c is worked out in integers.
+CLOSE = 2.0**-40
+
 # Between these sizes of D and L, squares of squares neither overflow nor come near the subnormal numbers.
 SMALLEST, LARGEST = 1e-70, 1e70
 
@@ -98,11 +101,12 @@ def look(ox: Number, oy: Number, oz: Number, cx: Number, cy: Number, cz: Number,
 
 
 def look_twofold(
-    ox: Number, oy: Number, oz: Number, cx: Number, cy: Number, cz: Number, radius: Number, on: Number
-) -> Ten:
+    ox: Number, oy: Number, oz: Number, cx: Number, cy: Number, cz: Number, radius: Number,
+    known: Number, known_low: Number, known_error: Number,
+) -> Ten:  # fmt: skip
     """A sphere as seen from a ray's origin: L without error, c in two-fold float64, its error, l.
 
-    Where `on` is true the origin is known to lie exactly on the sphere, and c is exactly 0.
+    c is what is known of it, unless that is NaN.
     """
     lx, lx_low = two_sum(ox, -cx)
     ly, ly_low = two_sum(oy, -cy)
@@ -110,8 +114,9 @@ def look_twofold(
     square, square_low = dot(lx, ly, lz, lx_low, ly_low, lz_low, lx, ly, lz, lx_low, ly_low, lz_low)
     r2, r2_low = two_product(radius, radius)
     c, c_low = add(square, square_low, -r2, -r2_low)
-    size = square + r2
-    c, c_low, c_error = select(on, 0.0, c), select(on, 0.0, c_low), select(on, 0.0, C_ERROR_2 * size)
+    size, is_known = square + r2, known == known
+    c, c_low = select(is_known, known, c), select(is_known, known_low, c_low)
+    c_error = select(is_known, known_error, C_ERROR_2 * size)
     return lx, ly, lz, lx_low, ly_low, lz_low, c, c_low, c_error, in_range(np.sqrt(size))
 
 
@@ -215,7 +220,7 @@ def arrive(t: Number, low: Number, a: Number, best: Number) -> Three:
     """`approach` for what `meet` found, to a tolerance of K_ERROR / 2."""
     k = t * a
     tie = (t < np.inf) & (k * (1.0 + 4.0 * K_ERROR) >= best) & (k * (1.0 - 4.0 * K_ERROR) <= best)
-    maybe = (low < np.inf) & (low * a * (1.0 - 4.0 * K_ERROR) <= best)
+    maybe = select(low * a * (1.0 - 4.0 * K_ERROR) > best, False, low < np.inf)  # a NaN is behind nothing
     return k, k * (1.0 + 4.0 * K_ERROR) < best, tie | maybe
 
 

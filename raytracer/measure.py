@@ -25,13 +25,11 @@ from raytracer import backend, exact, plain
 from raytracer.arrays import Hits
 from raytracer.families import FAMILIES, Bundle, bundles
 from raytracer.interpreter import interpreter
-from raytracer.methods import CERTIFIED, METHODS
+from raytracer.methods import METHODS
 from raytracer.plan import Plan, make_plan
 from raytracer.render import draw, trace_whole
 from raytracer.scene import Scene
-from raytracer.trace import Targets, _trace_given, ray_intersect_scene
-from raytracer.units import in_units, unit_directions
-from raytracer.usual import usual_given
+from raytracer.trace import ray_intersect_scene, trace_given
 
 COMPILED, NUMPY = "compiled", "numpy"
 SCENES = Path(__file__).parent.parent / "scenes"
@@ -193,19 +191,7 @@ def trace(racer: Racer, bundle: Bundle) -> Hits:
     if racer.backend == COMPILED:
         backend.load()
         return ray_intersect_scene(*rays, racer.method)
-    with np.errstate(all="ignore"):
-        return _trace_in_numpy(racer.method, *rays)
-
-
-def _trace_in_numpy(
-    method: str, origins: np.ndarray, directions: np.ndarray, centres: np.ndarray, radii: np.ndarray
-) -> Hits:
-    if method != CERTIFIED:
-        return usual_given(method, origins, directions, centres, radii, plain)
-    unit, (origins, centres, radii) = in_units(origins, centres, radii)
-    exponents, directions = unit_directions(directions)
-    hits = _trace_given(origins, directions, Targets(centres, radii, np.zeros(len(radii), bool), plain))
-    return Hits(np.ldexp(hits.t, unit - exponents), hits.index)
+    return trace_given(*rays, racer.method, plain)
 
 
 def trace_bundles(racer: Racer, some: Iterable[Bundle]) -> Hits:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from raytracer.arrays import Balls, Boxed, First, Grid, Nearest, Rays, Seen, TwofoldRays, UsualRays
+from raytracer.arrays import Balls, Boxed, First, Grid, Nearest, Rays, Seen, Sides, TwofoldRays, UsualRays
 from raytracer.camera import directions
 from raytracer.certified import (
     K_ERROR,
@@ -30,7 +30,7 @@ from raytracer.methods import METHODS, Vector
 
 def see(origin: np.ndarray, centres: np.ndarray, radii: np.ndarray) -> Seen:
     """All spheres, centres (s, 3) and radii (s,), as seen from one origin (3,)."""
-    x, y, z, _, _, _, c, _, c_error, size = look_twofold(*xyz(origin), *xyz(centres), radii, False)
+    x, y, z, _, _, _, c, _, c_error, size = look_twofold(*xyz(origin), *xyz(centres), radii, np.nan, 0.0, 0.0)
     return Seen(x, y, z, c, U * abs(c) + c_error, size, radii, rim_of(c, size))
 
 
@@ -85,13 +85,13 @@ def nearest_twofold(
     boxed: Boxed,
     centres: np.ndarray,
     radii: np.ndarray,
-    on: np.ndarray,
+    sides: Sides,
     nearest: Nearest,
 ) -> None:
     """Rays (n,) from origins (n, 3) against all spheres, in two-fold arithmetic where float64 does not say "behind".
 
-    on is bool (s,): spheres on which all these origins are known to lie exactly. A sphere equal to one that came
-    earlier in the file cannot win, and is passed over.
+    sides is what is known of the spheres, seen from all these origins. A sphere equal to one that came earlier in the
+    file cannot win, and is passed over.
     """
     t_low = np.zeros_like(nearest.t)
     x, y, z, reach = rays.x, rays.y, rays.z, rays.reach
@@ -105,7 +105,7 @@ def nearest_twofold(
         twin = (best >= 0) & (radii[best] == radius) & (centres[best] == centre).all(axis=1)
         some = some[contends(*rough, nearest.t[some], nearest.error[some]) & ~twin]
         if some.size:
-            seen = look_twofold(*xyz(origins[some]), *xyz(centre), radius, on[i])
+            seen = look_twofold(*xyz(origins[some]), *xyz(centre), radius, *Sides._make(array[i] for array in sides))
             so_far = nearest.t[some], t_low[some], nearest.error[some], nearest.index[some], nearest.unsure[some]
             found = nearer(*so_far, *meet_twofold(*seen, *TwofoldRays._make(array[some] for array in rays)), i)
             for array, value in zip((nearest.t, t_low, *nearest[1:]), found, strict=True):
@@ -146,11 +146,9 @@ def usual_given(
         np.minimum(t, found, out=t)
 
 
-def polish(
-    origins: np.ndarray, rays: TwofoldRays, centres: np.ndarray, radii: np.ndarray, on: np.ndarray
-) -> np.ndarray:
+def polish(origins: np.ndarray, rays: TwofoldRays, centres: np.ndarray, radii: np.ndarray, sides: Sides) -> np.ndarray:
     """t of rays (n,), each against its own sphere, to the last digit; +inf where two-fold arithmetic is not certain."""
-    t, _, _, _ = meet_twofold(*look_twofold(*xyz(origins), *xyz(centres), radii, on), *rays)
+    t, _, _, _ = meet_twofold(*look_twofold(*xyz(origins), *xyz(centres), radii, *sides), *rays)
     return t
 
 

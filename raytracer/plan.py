@@ -86,7 +86,7 @@ def _reasons(scene: Scene, name: str, stage: Stage, eye: Eye, lights: tuple[Ligh
 
 
 def _reasons_for_tracing(scene: Scene, eye: Eye) -> Iterator[str]:
-    radii, on = eye.targets.radii, eye.targets.on
+    radii, on = eye.targets.radii, eye.targets.sides.c == 0
     total, seen = len(scene.spheres), len(radii)
     if seen < total:
         yield f"{_count(range(total - seen), 'sphere')} of {total} cannot be seen: behind the eye or beside the picture"

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from fractions import Fraction
 from types import ModuleType
 from typing import NamedTuple
 
 import numpy as np
 
 from raytracer import backend, exact
-from raytracer.arrays import Balls, Boxed, First, Hits, Nearest, Seen, TwofoldRays
+from raytracer.arrays import Balls, Boxed, First, Hits, Nearest, Seen, Sides, TwofoldRays
 from raytracer.boxes import screen_boxes
 from raytracer.camera import (
     Raster,
@@ -19,7 +20,7 @@ from raytracer.camera import (
     twofold_eye_rays,
     twofold_given_rays,
 )
-from raytracer.certified import LARGEST_SPREAD, U, contends, look, meet
+from raytracer.certified import CLOSE, LARGEST_SPREAD, U, contends, look, meet
 from raytracer.methods import CERTIFIED, check_method
 from raytracer.plain import xyz
 from raytracer.scene import Scene, vector
@@ -39,7 +40,7 @@ class Targets(NamedTuple):
 
     centres: np.ndarray  # (s, 3)
     radii: np.ndarray  # (s,)
-    on: np.ndarray  # bool (s,): all rays are known to start exactly on this sphere
+    sides: Sides  # what is known of c from where all rays start
     path: ModuleType  # `raytracer.plain` or `raytracer.kernels`
 
 
@@ -73,7 +74,7 @@ def open_eye(scene: Scene, raster: Raster, method: str = CERTIFIED) -> Eye:
     tests = int(((right - left) * (bottom - top)).sum())
     path = backend.choose(tests, len(raster.bands()) * len(radii))
     seen = path.see(origin, centres, radii)
-    on = _settle_sides(origin, centres, radii, seen)
+    sides = _settle_sides(origin, centres, radii, seen)
     kappa = spread(raster) if spread(raster) <= LARGEST_SPREAD else 0.0
     return Eye(
         raster,
@@ -81,7 +82,7 @@ def open_eye(scene: Scene, raster: Raster, method: str = CERTIFIED) -> Eye:
         origin,
         order,
         len(order) == len(scene),
-        Targets(centres, radii, on, path),
+        Targets(centres, radii, sides, path),
         seen,
         boxes,
         method,
@@ -96,7 +97,7 @@ def trace_rows(eye: Eye, rows: slice) -> Hits:
     """What the eye rays of these rows of the picture hit first: t good enough to be shaded, not to the last digit."""
     if eye.method != CERTIFIED:
         return _usual_rows(eye, rows)
-    return _in_file_order(eye, _trace_rows(eye, rows))
+    return _in_file_order(eye, _trace_rows(eye, rows)[0])
 
 
 @_NOT_A_NUMBER_IS_NO_ERROR
@@ -104,12 +105,11 @@ def polished_rows(eye: Eye, rows: slice) -> Hits:
     """`trace_rows`, with t to the last digit that the method gives."""
     if eye.method != CERTIFIED:
         return _usual_rows(eye, rows)
-    hits = _trace_rows(eye, rows)
-    _polish(hits, _pixels_of(eye, rows), eye.targets)
+    hits, unsure = _trace_rows(eye, rows)
+    _polish(hits, unsure, _pixels_of(eye, rows), eye.targets)
     return _in_file_order(eye, hits)
 
 
-@_NOT_A_NUMBER_IS_NO_ERROR
 def ray_intersect_scene(
     origins: np.ndarray, directions: np.ndarray, centres: np.ndarray, radii: np.ndarray, method: str = CERTIFIED
 ) -> Hits:
@@ -130,11 +130,19 @@ def ray_intersect_scene(
     _refuse_bad_rays(origins, directions, centres, radii)
     check_method(method)
     path = backend.choose(len(origins) * len(radii), -(-len(origins) // _CHUNK) * len(radii))
+    return trace_given(origins, directions, centres, radii, method, path)
+
+
+@_NOT_A_NUMBER_IS_NO_ERROR
+def trace_given(
+    origins: np.ndarray, directions: np.ndarray, centres: np.ndarray, radii: np.ndarray, method: str, path: ModuleType
+) -> Hits:
+    """`ray_intersect_scene` on a path of one's choice, of arrays that are known to be good."""
     if method != CERTIFIED:
         return usual_given(method, origins, directions, centres, radii, path)
     unit, (origins, centres, radii) = in_units(origins, centres, radii)
     exponents, directions = unit_directions(directions)
-    targets = Targets(centres, radii, np.zeros(len(radii), bool), path)
+    targets = Targets(centres, radii, Sides.unknown(len(radii)), path)
     hits = Hits(np.empty(len(origins)), np.empty(len(origins), np.int32))
     for start in range(0, len(origins), _CHUNK):
         some = slice(start, start + _CHUNK)
@@ -155,7 +163,7 @@ def _trace_given(origins: np.ndarray, directions: np.ndarray, targets: Targets) 
 
     hits = Hits(nearest.t, nearest.index)
     _settle(hits, nearest.unsure, rays_of, targets)
-    _polish(hits, rays_of, targets)
+    _polish(hits, nearest.unsure, rays_of, targets)
     return hits
 
 
@@ -164,14 +172,14 @@ def _usual_rows(eye: Eye, rows: slice) -> Hits:
     return Hits(t, _places(eye, index))
 
 
-def _trace_rows(eye: Eye, rows: slice) -> Hits:
-    """Of the spheres in view, in the eye's units."""
+def _trace_rows(eye: Eye, rows: slice) -> tuple[Hits, np.ndarray]:
+    """Hits of the spheres in view, in the eye's units, and of which of them float64 was unsure."""
     grid = eye_grid(eye.raster, rows)
     first = First.nothing_yet((len(grid.up), len(grid.across)))
     eye.targets.path.first_of_grid(grid, eye.seen, eye.boxes, rows.start, eye.kappa, first)
     hits = Hits(eye.targets.path.distances(grid, eye.seen, first), first.index)
     _settle(hits, first.unsure, _pixels_of(eye, rows), eye.targets)
-    return hits
+    return hits, first.unsure
 
 
 def _in_file_order(eye: Eye, hits: Hits) -> Hits:
@@ -202,26 +210,28 @@ def level(eye: Eye, x: int, y: int) -> str:
     eye.targets.path.first_of_grid(grid, eye.seen, eye.boxes, y, eye.kappa, first)
     if not first.unsure[0, x]:
         return "float64"
-    bundle, (centres, radii, on, path) = _pixels_of(eye, slice(y, y + 1))((np.array([0]), np.array([x]))), eye.targets
+    bundle, (centres, radii, sides, path) = (
+        _pixels_of(eye, slice(y, y + 1))((np.array([0]), np.array([x]))),
+        eye.targets,
+    )
     found = Nearest.nothing_yet((1,))
-    path.nearest_twofold(bundle.origins, bundle.rays, bundle.boxed, centres, radii, on, found)
+    path.nearest_twofold(bundle.origins, bundle.rays, bundle.boxed, centres, radii, sides, found)
     return "integers" if found.unsure[0] else "two-fold float64"
 
 
-def _settle_sides(origin: np.ndarray, centres: np.ndarray, radii: np.ndarray, seen: Seen) -> np.ndarray:
-    """Find out exactly whether the origin is inside, on or outside the spheres of which `see` is not certain.
+def _settle_sides(origin: np.ndarray, centres: np.ndarray, radii: np.ndarray, seen: Seen) -> Sides:
+    """Work out c in integers for the spheres that the origin is close to, and put it into `seen` as well.
 
-    Returns on which it is, bool (s,). Where c cannot be held in a float64 it stays uncertain.
+    Where c cannot be held in a float64 it stays unknown.
     """
-    on = np.zeros(len(radii), bool)
-    for i in np.flatnonzero(~(np.abs(seen.c) > seen.c_error) | ~np.isfinite(seen.c)):
+    sides = Sides.unknown(len(radii))
+    for i in np.flatnonzero(~(np.abs(seen.c) > CLOSE * seen.size * seen.size) | ~np.isfinite(seen.c)):
         c = exact.side(vector(origin), vector(centres[i]), float(radii[i]))
-        on[i] = c == 0
         if c == 0 or 1e-280 < abs(c) < 1e280:
-            seen.c[i] = float(c)
-            seen.c_error[i] = U * abs(float(c))
-            seen.rim[i] = 0.0
-    return on
+            high = float(c)
+            sides.c[i], sides.c_low[i], sides.c_error[i] = high, float(c - Fraction(high)), U * U * abs(high)
+            seen.c[i], seen.c_error[i], seen.rim[i] = high, U * abs(high), 0.0
+    return sides
 
 
 def _pixels_of(eye: Eye, rows: slice) -> Callable[[Index], Bundle]:
@@ -240,9 +250,9 @@ def _settle(hits: Hits, unsure: np.ndarray, rays_of: Callable[[Index], Bundle], 
     if not unsure.any():
         return
     pending = np.nonzero(unsure)
-    bundle, (centres, radii, on, path) = rays_of(pending), targets
+    bundle, (centres, radii, sides, path) = rays_of(pending), targets
     found = Nearest.nothing_yet(pending[0].shape)
-    path.nearest_twofold(bundle.origins, bundle.rays, bundle.boxed, centres, radii, on, found)
+    path.nearest_twofold(bundle.origins, bundle.rays, bundle.boxed, centres, radii, sides, found)
     _settle_exactly(found, bundle, targets)
     hits.t[pending], hits.index[pending] = found.t, found.index
 
@@ -270,12 +280,17 @@ def _contenders(bundle: Bundle, rays: np.ndarray, targets: Targets) -> np.ndarra
     return np.asarray(contends(t, error, low, (t + error).min(axis=1, keepdims=True), 0.0))
 
 
-def _polish(hits: Hits, rays_of: Callable[[Index], Bundle], targets: Targets) -> None:
-    """Bring the t of hits to the last digit."""
-    which = np.nonzero(hits.index >= 0)
-    bundle, (centres, radii, on, path), spheres = rays_of(which), targets, hits.index[which]
-    t = path.polish(bundle.origins, bundle.rays, centres[spheres], radii[spheres], on[spheres])
-    hits.t[which] = np.where(np.isfinite(t), t, hits.t[which])
+def _polish(hits: Hits, unsure: np.ndarray, rays_of: Callable[[Index], Bundle], targets: Targets) -> None:
+    """Bring the t of hits to the last digit; those that float64 was unsure of have it already."""
+    which = np.nonzero((hits.index >= 0) & ~unsure)
+    bundle, (centres, radii, sides, path), spheres = rays_of(which), targets, hits.index[which]
+    known = Sides._make(array[spheres] for array in sides)
+    t = path.polish(bundle.origins, bundle.rays, centres[spheres], radii[spheres], known)
+    for k in np.flatnonzero(~np.isfinite(t)).tolist():
+        sphere = vector(centres[spheres[k]]), float(radii[spheres[k]])
+        direction, unit = bundle.exact_direction(k)
+        t[k], _ = exact.nearest_hit(bundle.origins[k].tolist(), direction, [sphere], unit)
+    hits.t[which] = t
 
 
 def _vectors(name: str, vectors: np.ndarray) -> np.ndarray:

@@ -209,3 +209,40 @@ def hit_in_many_digits(scene, x, y, size):
             if along > 0 and along**2 >= mpmath.fdot(ray, ray) * (mpmath.fdot(away, away) - mpmath.mpf(radius) ** 2):
                 return True
     return False
+
+
+@pytest.mark.parametrize("size", [1e-300, 1e-160, 1e-100, 1e-20, 1e20, 1e60, 1e82, 1e100, 1e150, 1e300])
+def test_frames_of_any_size_draw_the_same_picture(path, size):
+    """All rays are longer by that factor, and meet the same spheres."""
+    scene = interpreter("scenes/04_many_spheres.cli")
+    exponent = math.frexp(size)[1]
+    axes = (tuple(math.ldexp(x, exponent) for x in axis) for axis in (scene.camera.u, scene.camera.v, scene.camera.w))
+    camera = Camera(scene.camera.eye, *axes, scene.camera.fov)
+    wide = raytracer.Scene(camera, spheres=scene.spheres, materials=scene.materials)
+    np.testing.assert_array_equal(eye_hits(wide, 20, 20).index, eye_hits(scene, 20, 20).index)
+
+
+@pytest.mark.parametrize("fov", [1e-300, 1e-153, 1e-120, 1e-20, 1e-6])
+def test_narrow_views_lose_nothing(path, fov):
+    scene = interpret(f"fov {fov!r}\nsurface 1 1 1 0 0 0 0 0 0 1 0\nsphere 1 .25 0 -4\nsphere 1e-3 0 0 -2")
+    assert (eye_hits(scene, 7, 7).index == 1).all()
+
+
+def test_t_is_right_to_the_last_digit_very_close_to_a_sphere(path):
+    near = interpret(
+        "uvw 0 0 1 -0.9994363150364214 0.03357159791280531 0 -0.03357159791280531 -0.9994363150364214 0\n"
+        "surface 1 1 1 0 0 0 0 0 0 1 0\nsphere 165030125 5540325 164937100 0.0013135069282355306\n"
+    )
+    assert eye_hits(near, 3, 3).t[0, 0] == 3.017941965283198e-15
+    rng = np.random.default_rng(5)
+    for _ in range(40):
+        centre, radius = rng.normal(size=3) * 10.0 ** rng.uniform(0, 8), 10.0 ** rng.uniform(0, 8)
+        centre *= radius * (1 + rng.choice([-1, 1]) * 10.0 ** rng.uniform(-17, -8)) / np.linalg.norm(centre)
+        x, y, z = centre.tolist()
+        scene = interpret(f"fov 120\nsurface 1 1 1 0 0 0 0 0 0 1 0\nsphere {radius!r} {x!r} {y!r} {z!r}")
+        raster, hits = make_raster(scene.camera, 6, 6), eye_hits(scene, 6, 6)
+        for row, column in np.ndindex(6, 6):
+            direction, unit = raster.whole_direction(column, row)
+            t, index = exact.nearest_hit(scene.camera.eye, direction, [((x, y, z), radius)], unit)
+            assert hits.index[row, column] == index
+            assert hits.t[row, column] == t or abs(hits.t[row, column] - t) <= np.spacing(t)

@@ -31,7 +31,9 @@ def see(origin, centres, radii):
     ox, oy, oz = origin[0], origin[1], origin[2]
     for i in range(n):
         cx, cy, cz = centres[i, 0], centres[i, 1], centres[i, 2]
-        x[i], y[i], z[i], _, _, _, c[i], _, error, size[i] = look_twofold(ox, oy, oz, cx, cy, cz, radii[i], False)
+        x[i], y[i], z[i], _, _, _, c[i], _, error, size[i] = look_twofold(
+            ox, oy, oz, cx, cy, cz, radii[i], np.nan, 0.0, 0.0
+        )
         c_error[i] = U * abs(c[i]) + error
         rim[i] = rim_of(c[i], size[i])
     return Seen(x, y, z, c, c_error, size, radii, rim)
@@ -134,7 +136,7 @@ def nearest_given(origins, rays, centres, radii, nearest):
 
 
 @compiled
-def nearest_twofold(origins, rays, boxed, centres, radii, on, nearest):
+def nearest_twofold(origins, rays, boxed, centres, radii, sides, nearest):
     """`plain.nearest_twofold`."""
     best, best_error, best_index, unsure = nearest
     for k in range(len(origins)):
@@ -154,7 +156,7 @@ def nearest_twofold(origins, rays, boxed, centres, radii, on, nearest):
             if not contends(t, error, low, best[k], best_error[k]) or _equal(centres, radii, best_index[k], i):
                 continue
             lx, ly, lz, lx_low, ly_low, lz_low, c, c_low, c_error, size = look_twofold(
-                ox, oy, oz, cx, cy, cz, radii[i], on[i]
+                ox, oy, oz, cx, cy, cz, radii[i], sides.c[i], sides.c_low[i], sides.c_error[i]
             )
             t, rest, error, low = meet_twofold(
                 lx, ly, lz, lx_low, ly_low, lz_low, c, c_low, c_error, size, dx, dy, dz, dx_low, dy_low, dz_low, m
@@ -165,12 +167,21 @@ def nearest_twofold(origins, rays, boxed, centres, radii, on, nearest):
 
 
 @compiled
-def polish(origins, rays, centres, radii, on):
+def polish(origins, rays, centres, radii, sides):
     """`plain.polish`."""
     found = np.empty(len(radii))
     for k in range(len(radii)):
         lx, ly, lz, lx_low, ly_low, lz_low, c, c_low, c_error, size = look_twofold(
-            origins[k, 0], origins[k, 1], origins[k, 2], centres[k, 0], centres[k, 1], centres[k, 2], radii[k], on[k]
+            origins[k, 0],
+            origins[k, 1],
+            origins[k, 2],
+            centres[k, 0],
+            centres[k, 1],
+            centres[k, 2],
+            radii[k],
+            sides.c[k],
+            sides.c_low[k],
+            sides.c_error[k],
         )
         found[k], _, _, _ = meet_twofold(
             lx, ly, lz, lx_low, ly_low, lz_low, c, c_low, c_error, size,
