@@ -37,8 +37,9 @@ class Root(NamedTuple):
         """The float64 nearest to the root: +inf beyond the largest."""
         bits = 0
         while True:
-            root = isqrt(self.radicand << 2 * bits)
-            exact = root * root == self.radicand << 2 * bits
+            scaled = self.radicand << 2 * bits
+            root = isqrt(scaled)
+            exact = root * root == scaled
             low = (self.base << bits) + self.sign * root
             high = low if exact else low + self.sign
             nearest = _ratio(low * self.over, self.under << bits)
@@ -97,8 +98,13 @@ def nearest_hit(
     The ray's direction is `direction` / `unit`. Only t > 0 counts; a tangent ray hits; from inside, the far root is the
     hit; of equal roots the first sphere's wins.
     """
+    return nearest_of(_flat(origin, spheres), direction, unit)
+
+
+def nearest_of(lengths: list[Exact], direction: Sequence[Exact], unit: int = 1) -> tuple[float, int]:
+    """`nearest_hit`, its lengths in one list: the origin, then centre and radius of each sphere."""
     best, index = None, -1
-    for i, root in enumerate(hits(origin, direction, spheres, unit)):
+    for i, root in enumerate(_hits(lengths, direction, unit)):
         if root is not None and (best is None or root.is_nearer(best)):
             best, index = root, i
     return (inf, -1) if best is None else (best.nearest_float(), index)
@@ -108,13 +114,21 @@ def hits(
     origin: Sequence[Exact], direction: Sequence[Exact], spheres: Iterable[tuple[Sequence[Exact], Exact]], unit: int = 1
 ) -> list[Root | None]:
     """The smallest positive root of each sphere, or None for a miss; the ray's direction is `direction` / `unit`."""
+    return _hits(_flat(origin, spheres), direction, unit)
+
+
+def _flat(origin: Sequence[Exact], spheres: Iterable[tuple[Sequence[Exact], Exact]]) -> list[Exact]:
     numbers = [*origin]
     for centre, radius in spheres:
         numbers += (*centre, radius)
-    lengths, length_unit = _integers(numbers)
+    return numbers
+
+
+def _hits(lengths: list[Exact], direction: Sequence[Exact], unit: int) -> list[Root | None]:
+    whole, length_unit = _integers(lengths)
     steps, step_unit = _integers(direction)
-    over = step_unit * unit
-    return [_hit(lengths[:3], steps, lengths[k : k + 4], over, length_unit) for k in range(3, len(lengths), 4)]
+    over, eye = step_unit * unit, whole[:3]
+    return [_hit(eye, steps, whole[k : k + 4], over, length_unit) for k in range(3, len(whole), 4)]
 
 
 def side(origin: Sequence[Exact], centre: Sequence[Exact], radius: Exact) -> Fraction:
@@ -127,9 +141,11 @@ def _hit(eye: list[int], steps: list[int], sphere: list[int], over: int, under: 
     middle, radicand, a = _reduced(eye, steps, sphere)
     if radicand < 0:
         return None
-    for sign in (-1, 1):
-        if _sign_with_root(middle, sign, radicand) > 0:
-            return Root(middle, sign, radicand, over, a * under)
+    square = middle * middle
+    if middle > 0 and square > radicand:
+        return Root(middle, -1, radicand, over, a * under)
+    if middle > 0 or square < radicand:
+        return Root(middle, 1, radicand, over, a * under)
     return None
 
 
@@ -179,6 +195,8 @@ def _integers(numbers: Iterable[Exact]) -> tuple[list[int], int]:
     """Integers, and how many of them make 1: numbers = integers / that."""
     ratios = [number.as_integer_ratio() for number in numbers]
     whole = lcm(*[d for _, d in ratios])
+    if whole == 1:
+        return [n for n, _ in ratios], 1
     return [n * (whole // d) for n, d in ratios], whole
 
 

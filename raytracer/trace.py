@@ -253,7 +253,8 @@ def _settle(hits: Hits, unsure: np.ndarray, rays_of: Callable[[Index], Bundle], 
     bundle, (centres, radii, sides, path) = rays_of(pending), targets
     found = Nearest.nothing_yet(pending[0].shape)
     path.nearest_twofold(bundle.origins, bundle.rays, bundle.boxed, centres, radii, sides, found)
-    _settle_exactly(found, bundle, targets)
+    if found.unsure.any():
+        _settle_exactly(found, bundle, targets)
     hits.t[pending], hits.index[pending] = found.t, found.index
 
 
@@ -261,13 +262,14 @@ def _settle_exactly(found: Nearest, bundle: Bundle, targets: Targets) -> None:
     """Decide what two-fold arithmetic left open, in integers, among the spheres that float64 cannot rule out."""
     open_rays = np.flatnonzero(found.unsure)
     at_once = max(1, _CHUNK // max(1, len(targets.radii)))
+    balls = np.column_stack([targets.centres, targets.radii])
     for start in range(0, len(open_rays), at_once):
         some = open_rays[start : start + at_once]
-        for k, contend in zip(some.tolist(), _contenders(bundle, some, targets), strict=True):
-            which = np.flatnonzero(contend)
-            spheres = zip(targets.centres[which].tolist(), targets.radii[which].tolist(), strict=True)
+        origins, contend = bundle.origins[some].tolist(), _contenders(bundle, some, targets)
+        for k, origin, row in zip(some.tolist(), origins, contend, strict=True):
+            which = row.nonzero()[0]
             direction, unit = bundle.exact_direction(k)
-            found.t[k], i = exact.nearest_hit(bundle.origins[k].tolist(), direction, spheres, unit)
+            found.t[k], i = exact.nearest_of([*origin, *balls[which].ravel().tolist()], direction, unit)
             found.index[k] = which[i] if i >= 0 else -1
 
 
