@@ -130,7 +130,7 @@ def meet(
     root = np.sqrt(abs(disc))
     q = abs(h) + root
     far_root = (h < 0.0) & (c <= 0.0)
-    t = distance(h, a, c)
+    t = distance(h, a, c, root)
     part = select(far_root, A_ERROR * (m * m) / a, c_error / abs(c)) + 8 * U
     limit = tolerance * select(t * m < radius, t, radius / m)
     disc_error = DISC_ERROR * (m * l) * (m * l) + m * m * c_error
@@ -142,9 +142,9 @@ def passes(h: Number, a: Number, c: Number, c_error: Number, ml: Number, m: Numb
     return h * h - a * c < -(DISC_ERROR * ml * ml + m * m * c_error)
 
 
-def distance(h: Number, a: Number, c: Number) -> Number:
-    """t of a hit: the near root from outside, the far one from inside or from the sphere itself."""
-    q = abs(h) + np.sqrt(abs(h * h - a * c))
+def distance(h: Number, a: Number, c: Number, root: Number) -> Number:
+    """t of a hit, from √disc: the near root from outside, the far one from inside or from the sphere itself."""
+    q = abs(h) + root
     return select((h < 0.0) & (c <= 0.0), q / a, abs(c) / q)
 
 

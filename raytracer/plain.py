@@ -58,7 +58,8 @@ def distances(grid: Grid, seen: Seen, first: First) -> np.ndarray:
     dx, dy, dz = (component[hit] for component in directions(grid))
     lx, ly, lz, c = (array[first.index[hit]] for array in (seen.x, seen.y, seen.z, seen.c))
     t = np.full(hit.shape, np.inf)
-    t[hit] = distance(dx * lx + dy * ly + dz * lz, dx * dx + dy * dy + dz * dz, c)
+    h, a = dx * lx + dy * ly + dz * lz, dx * dx + dy * dy + dz * dz
+    t[hit] = distance(h, a, c, np.sqrt(abs(h * h - a * c)))
     return t
 
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from raytracer import backend, exact
-from raytracer.arrays import Balls, Boxed, First, Hits, Nearest, Seen, Sides, TwofoldRays
+from raytracer.arrays import Balls, Boxed, First, Grid, Hits, Nearest, Seen, Sides, TwofoldRays
 from raytracer.boxes import screen_boxes
 from raytracer.camera import (
     Raster,
@@ -69,13 +69,15 @@ def open_eye(scene: Scene, raster: Raster, method: str = CERTIFIED) -> Eye:
     boxes = screen_boxes(raster, origin, centres, radii)
     in_view = (boxes[:, 1] > boxes[:, 0]) & (boxes[:, 3] > boxes[:, 2])
     order, boxes, centres, radii = spheres.order[in_view], boxes[in_view], centres[in_view], radii[in_view]
-    known = balls(method, spheres.centres[in_view], spheres.radii[in_view])
+    known = Balls(centres, radii)
+    if method != CERTIFIED:  # a usual method is given the scene's own numbers
+        known = balls(method, spheres.centres[in_view], spheres.radii[in_view])
     left, right, top, bottom = boxes.astype(np.int64).T
     tests = int(((right - left) * (bottom - top)).sum())
     path = backend.choose(tests, len(raster.bands()) * len(radii))
     seen = path.see(origin, centres, radii)
     sides = _settle_sides(origin, centres, radii, seen)
-    kappa = spread(raster) if spread(raster) <= LARGEST_SPREAD else 0.0
+    kappa = spread(raster)
     return Eye(
         raster,
         unit,
@@ -87,7 +89,7 @@ def open_eye(scene: Scene, raster: Raster, method: str = CERTIFIED) -> Eye:
         boxes,
         method,
         known,
-        kappa,
+        kappa if kappa <= LARGEST_SPREAD else 0.0,
         tests,
     )
 
@@ -174,12 +176,18 @@ def _usual_rows(eye: Eye, rows: slice) -> Hits:
 
 def _trace_rows(eye: Eye, rows: slice) -> tuple[Hits, np.ndarray]:
     """Hits of the spheres in view, in the eye's units, and of which of them float64 was unsure."""
-    grid = eye_grid(eye.raster, rows)
-    first = First.nothing_yet((len(grid.up), len(grid.across)))
-    eye.targets.path.first_of_grid(grid, eye.seen, eye.boxes, rows.start, eye.kappa, first)
+    grid, first = _first(eye, rows)
     hits = Hits(eye.targets.path.distances(grid, eye.seen, first), first.index)
     _settle(hits, first.unsure, _pixels_of(eye, rows), eye.targets)
     return hits, first.unsure
+
+
+def _first(eye: Eye, rows: slice) -> tuple[Grid, First]:
+    """What float64 makes of these rows."""
+    grid = eye_grid(eye.raster, rows)
+    first = First.nothing_yet((len(grid.up), len(grid.across)))
+    eye.targets.path.first_of_grid(grid, eye.seen, eye.boxes, rows.start, eye.kappa, first)
+    return grid, first
 
 
 def _in_file_order(eye: Eye, hits: Hits) -> Hits:
@@ -205,17 +213,11 @@ class Bundle(NamedTuple):
 @_NOT_A_NUMBER_IS_NO_ERROR
 def level(eye: Eye, x: int, y: int) -> str:
     """What it takes to be certain of a pixel: float64, two-fold float64 or integers."""
-    grid = eye_grid(eye.raster, slice(y, y + 1))
-    first = First.nothing_yet((1, len(grid.across)))
-    eye.targets.path.first_of_grid(grid, eye.seen, eye.boxes, y, eye.kappa, first)
+    row = slice(y, y + 1)
+    _, first = _first(eye, row)
     if not first.unsure[0, x]:
         return "float64"
-    bundle, (centres, radii, sides, path) = (
-        _pixels_of(eye, slice(y, y + 1))((np.array([0]), np.array([x]))),
-        eye.targets,
-    )
-    found = Nearest.nothing_yet((1,))
-    path.nearest_twofold(bundle.origins, bundle.rays, bundle.boxed, centres, radii, sides, found)
+    found = _in_twofold(_pixels_of(eye, row)((np.array([0]), np.array([x]))), eye.targets)
     return "integers" if found.unsure[0] else "two-fold float64"
 
 
@@ -250,12 +252,19 @@ def _settle(hits: Hits, unsure: np.ndarray, rays_of: Callable[[Index], Bundle], 
     if not unsure.any():
         return
     pending = np.nonzero(unsure)
-    bundle, (centres, radii, sides, path) = rays_of(pending), targets
-    found = Nearest.nothing_yet(pending[0].shape)
-    path.nearest_twofold(bundle.origins, bundle.rays, bundle.boxed, centres, radii, sides, found)
+    bundle = rays_of(pending)
+    found = _in_twofold(bundle, targets)
     if found.unsure.any():
         _settle_exactly(found, bundle, targets)
     hits.t[pending], hits.index[pending] = found.t, found.index
+
+
+def _in_twofold(bundle: Bundle, targets: Targets) -> Nearest:
+    """What two-fold arithmetic makes of these rays."""
+    centres, radii, sides, path = targets
+    found = Nearest.nothing_yet((len(bundle.origins),))
+    path.nearest_twofold(bundle.origins, bundle.rays, bundle.boxed, centres, radii, sides, found)
+    return found
 
 
 def _settle_exactly(found: Nearest, bundle: Bundle, targets: Targets) -> None:

@@ -25,6 +25,12 @@ def run(*words, **options):
     return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=120, check=False, **options)
 
 
+def start_render(out, size, **options):
+    """A large picture, being drawn."""
+    command = [sys.executable, "-m", "raytracer", "render", str(SCENE), "-o", str(out), "--size", size]
+    return subprocess.Popen(command, cwd=ROOT, **options)
+
+
 def test_render_writes_what_render_scene_draws(tmp_path):
     out = tmp_path / "out.png"
     done = run(
@@ -106,8 +112,7 @@ def test_bad_input_gives_one_line_and_status_1(words, message, tmp_path):
 def test_a_killed_run_leaves_the_old_file(tmp_path):
     out = tmp_path / "out.png"
     out.write_bytes(b"old")
-    command = [sys.executable, "-m", "raytracer", "render", str(SCENE), "-o", str(out), "--size", "3000x3000"]
-    process = subprocess.Popen(command, cwd=ROOT)
+    process = start_render(out, "3000x3000")
     time.sleep(0.6)
     process.send_signal(signal.SIGKILL)
     process.wait(10)
@@ -115,18 +120,7 @@ def test_a_killed_run_leaves_the_old_file(tmp_path):
 
 
 def test_ctrl_c_ends_quietly(tmp_path):
-    command = [
-        sys.executable,
-        "-m",
-        "raytracer",
-        "render",
-        str(SCENE),
-        "-o",
-        str(tmp_path / "x.png"),
-        "--size",
-        "9000x9000",
-    ]
-    process = subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True)
+    process = start_render(tmp_path / "x.png", "9000x9000", stderr=subprocess.PIPE, text=True)
     time.sleep(2)
     process.send_signal(signal.SIGINT)
     _, errors = process.communicate(timeout=60)
@@ -138,18 +132,7 @@ def test_ctrl_c_ends_quietly(tmp_path):
 def test_a_long_picture_shows_its_progress_on_a_terminal(tmp_path):
     ours, theirs = pty.openpty()
     fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
-    command = [
-        sys.executable,
-        "-m",
-        "raytracer",
-        "render",
-        str(SCENE),
-        "-o",
-        str(tmp_path / "x.png"),
-        "--size",
-        "4000x4000",
-    ]
-    process = subprocess.Popen(command, cwd=ROOT, stderr=theirs)
+    process = start_render(tmp_path / "x.png", "4000x4000", stderr=theirs)
     os.close(theirs)
     shown = b""
     try:

@@ -72,7 +72,8 @@ def distances(grid, seen, first):
                 s = grid.across[x]
                 dx, dy, dz = s * ux + vx - bx, s * uy + vy - by, s * uz + vz - bz
                 h = dx * seen.x[i] + dy * seen.y[i] + dz * seen.z[i]
-                t[y, x] = distance(h, dx * dx + dy * dy + dz * dz, seen.c[i])
+                a = dx * dx + dy * dy + dz * dz
+                t[y, x] = distance(h, a, seen.c[i], np.sqrt(abs(h * h - a * seen.c[i])))
     return t
 
 
