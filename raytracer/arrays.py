@@ -33,14 +33,17 @@ class Rays(NamedTuple):
 
 
 class Grid(NamedTuple):
-    """The rays of some rows of a picture, D = across·u + up·v − back, in factors."""
+    """The rays of a picture, D = across·u + up·v − back, in factors; D·D = (a2·across + a1)·across + a0."""
 
     across: np.ndarray  # float64 (width,), U of each column
     up: np.ndarray  # float64 (rows,), V of each row
+    a1: np.ndarray  # float64 (rows,)
+    a0: np.ndarray  # float64 (rows,)
+    a2: float
     u: tuple[float, float, float]
     v: tuple[float, float, float]
     back: tuple[float, float, float]  # d·w
-    reach: np.ndarray  # float64 (rows,), at least the reach of each ray of the row
+    reach: float  # at least the reach of each ray of the picture
 
 
 class TwofoldRays(NamedTuple):
@@ -59,24 +62,41 @@ class TwofoldRays(NamedTuple):
 UsualRays = tuple[tuple[np.ndarray, np.ndarray, np.ndarray], ...]
 
 
-class Boxed(NamedTuple):
-    """Which rays can hit which spheres at all: those whose pixel lies in the sphere's box."""
+class Candidates(NamedTuple):
+    """Which spheres a ray may meet at all: of ray k, those numbered ids[starts[k] : starts[k + 1]], ascending."""
 
-    x: np.ndarray  # int32 (n,), a column for each ray
-    y: np.ndarray  # int32 (n,), a row for each ray
-    boxes: np.ndarray  # int32 (s, 4), left, right, top, bottom of each sphere, right and bottom excluded
+    starts: np.ndarray  # int64 (n + 1,)
+    ids: np.ndarray  # int32
+
+    @classmethod
+    def all(cls, rays: int, spheres: int) -> Candidates:
+        """Every ray, every sphere."""
+        ids = np.tile(np.arange(spheres, dtype=np.int32), rays)
+        return cls(np.arange(rays + 1, dtype=np.int64) * spheres, ids)
+
+    def rows(self, which: np.ndarray) -> np.ndarray:
+        """The number of the ray for each id of these rays, in order, counted from 0."""
+        return np.repeat(np.arange(len(which)), np.diff(self.starts)[which])
+
+    def of(self, which: np.ndarray) -> Candidates:
+        """The candidates of some of the rays."""
+        counts = np.diff(self.starts)[which]
+        starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+        shift = np.repeat(self.starts[which] - starts[:-1], counts)
+        return Candidates(starts, self.ids[np.arange(starts[-1]) + shift])
 
 
 class Sides(NamedTuple):
-    """What is known of c = L·L − r² from integers: arrays of shape (spheres,). c is NaN where nothing is."""
+    """What is known of c = L·L − r² from integers, for some spheres, seen from where all rays start."""
 
+    which: np.ndarray  # type: ignore[assignment]  # int32 (n,), numbers of spheres, ascending
     c: np.ndarray
     c_low: np.ndarray
     c_error: np.ndarray  # 0 where c is exactly 0: the origin lies on the sphere
 
     @classmethod
-    def unknown(cls, spheres: int) -> Sides:
-        return cls(np.full(spheres, np.nan), np.zeros(spheres), np.zeros(spheres))
+    def unknown(cls) -> Sides:
+        return cls(np.empty(0, np.int32), np.empty(0), np.empty(0), np.empty(0))
 
 
 class Seen(NamedTuple):
@@ -85,11 +105,14 @@ class Seen(NamedTuple):
     x: np.ndarray  # L = origin − centre, rounded once
     y: np.ndarray
     z: np.ndarray
+    hu: np.ndarray  # L·u, L·v and −L·back: D·L = across·hu + up·hv + hw
+    hv: np.ndarray
+    hw: np.ndarray
     c: np.ndarray  # L·L − r²
     c_error: np.ndarray  # a bound of c's error; 0 where c is exactly 0
     size: np.ndarray  # √(L·L + r²)
     radius: np.ndarray
-    rim: np.ndarray  # see `certified.rim_of`; 0 if `certified.approach` is not for this sphere
+    edge: np.ndarray  # see `certified.edge_of`; 0 if `certified.approach` is not for this sphere
 
 
 class Balls(NamedTuple):
@@ -122,3 +145,89 @@ class Nearest(NamedTuple):
     @classmethod
     def nothing_yet(cls, shape: tuple[int, ...]) -> Nearest:
         return cls(np.full(shape, np.inf), np.zeros(shape), np.full(shape, -1, np.int32), np.zeros(shape, bool))
+
+
+# ------------------------------------------------------------------------------------ what `raytracer.screen` shares
+
+
+class View(NamedTuple):
+    """A picture's rays and its spheres, for the kernels; `across` has eight elements to spare."""
+
+    across: np.ndarray  # the fields of Grid
+    up: np.ndarray
+    a1: np.ndarray
+    a0: np.ndarray
+    a2: float
+    u: tuple[float, float, float]
+    v: tuple[float, float, float]
+    back: tuple[float, float, float]
+    reach: float
+    kappa: float  # see `plain.see`
+    eye: tuple[float, float, float]
+    balls: np.ndarray  # float64, flat: x, y, z, radius of each sphere
+
+
+class Slow(NamedTuple):
+    """The spheres that `certified.approach` is not for."""
+
+    ids: np.ndarray  # int32 (n,)
+    boxes: np.ndarray  # int32 (n, 4)
+    seen: Seen
+
+
+class Bins(NamedTuple):
+    """Which of the other spheres reach into which tile."""
+
+    boxes: np.ndarray  # int32, flat: left, right, top, bottom of each sphere of the scene
+    starts: np.ndarray  # int64 (tiles + 1,)
+    ids: np.ndarray  # int32: the list of tile i is ids[starts[i] : starts[i + 1]], ascending; some more to spare
+    corners: np.ndarray  # uint32, for each list entry: left, right, top, bottom within the tile, a byte each
+    columns: int  # tiles side by side
+
+
+class Tile(NamedTuple):
+    """A rectangle of pixels."""
+
+    number: int
+    left: int
+    top: int
+    right: int  # excluded
+    bottom: int
+
+
+class Scratch(NamedTuple):
+    """What a thread writes on while it does a tile."""
+
+    k: np.ndarray  # float64 (rows · STRIDE,)
+    index: np.ndarray  # type: ignore[assignment]  # int32
+    doubt: np.ndarray  # bool
+    batch: np.ndarray  # float64 (40,)
+    rest: np.ndarray  # uint8 (24,)
+
+
+class Paints(NamedTuple):
+    """What a picture is painted with."""
+
+    background: np.ndarray  # float64 (3,), from 0 to 255
+    flat: np.ndarray  # float64 (3,), likewise: the one colour of a stage that has but one
+    lights: np.ndarray  # float64 (n, 6): the place as seen from the eye, the colour
+    material: np.ndarray  # int32 (spheres,), a row of colours
+    colours: np.ndarray  # float64, flat: red, green, blue, 0 of each material
+
+
+class Canvas(NamedTuple):
+    """A picture's bytes."""
+
+    bytes: np.ndarray  # uint8, flat
+    row_bytes: int  # from a row to the next
+    pixel_bytes: int  # 3 or 4
+    columns: int  # how many pixels of a row may be written to all of their bytes
+
+
+class HitRows(NamedTuple):
+    """Hits of some rows of a picture, flat."""
+
+    t: np.ndarray
+    index: np.ndarray  # type: ignore[assignment]
+    first_row: int
+    width: int

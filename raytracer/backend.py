@@ -7,6 +7,7 @@ ski-rental rule: R. Karp, "On-line algorithms versus off-line algorithms", 1992)
 
 from __future__ import annotations
 
+from importlib import import_module
 from importlib.util import find_spec
 from threading import Lock
 from types import ModuleType
@@ -29,28 +30,36 @@ def why_no_compiler() -> str:
 
 def load() -> ModuleType:
     """The compiled path, loaded if it was not; the numpy path where the compiler cannot be loaded."""
-    global _loaded, _fault
+    global _loaded
     with _loading:
         if _loaded is None:
-            try:
-                _loaded = _import_kernels()
-            except ImportError as error:
-                _loaded, _fault = plain, why_no_compiler() or f"numba cannot be loaded ({error})"
+            _loaded = import_kernels() or plain
         return _loaded
+
+
+def loaded() -> ModuleType | None:
+    """The path that is used for everything from now on, once there is one."""
+    return _loaded
 
 
 def choose(tests: int, loops: int) -> ModuleType:
     """The path for so many tests of a ray against a sphere, in so many loops over rays."""
     global _spent
+    if _loaded is not None:
+        return _loaded
     seconds = tests * _SECONDS_A_TEST + loops * _SECONDS_A_LOOP
     with _counting:
-        rent = _loaded is None and _spent + seconds <= _PRICE
+        rent = _spent + seconds <= _PRICE
         if rent:
             _spent += seconds
     return plain if rent else load()
 
 
-def _import_kernels() -> ModuleType:
-    import raytracer.kernels
-
-    return raytracer.kernels
+def import_kernels() -> ModuleType | None:
+    """The kernels, without using them from now on; None if their compiler cannot be loaded."""
+    global _fault
+    try:
+        return import_module("raytracer.kernels")
+    except ImportError as error:
+        _fault = why_no_compiler() or f"numba cannot be loaded ({error})"
+        return None

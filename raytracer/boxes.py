@@ -8,64 +8,127 @@ so U lies between the roots of K₃₃ U² − 2 K₁₃ U + K₁₁ = 0:
     U = (K₁₃ ± r √(|x n₃ − z n₁|² − r² |n₁ × n₃|²)) / K₃₃
 
 and V likewise. Written so, the root's argument does not cancel for small spheres.
+
+A sphere is in front where K₃₃ is well above 0 and z too: then no part of it reaches the plane of the eye. In float64 U
+is off by less than 8u·κ·|n₁||D| from the middle's rounding and 8u·κ·|n₃||D| / (K₃₃ / z²) of the half width from the
+others', both below what is added for them, for frames that magnify errors by no more than `camera.inverse_frame` allows.
 """
 
 from __future__ import annotations
 
+from math import frexp, inf, ldexp
+from typing import NamedTuple
+
 import numpy as np
 
-from raytracer.camera import Raster, inverse_frame
+from raytracer.camera import SAMPLINGS, Raster, inverse_frame
+from raytracer.certified import inner
+from raytracer.twofold import Number, select
 
-_PAD = 1e-9  # relative, against rounding, beside a pixel all around
-_CROSSES = 1e-6  # K₃₃ / z² below this: the sphere reaches the plane of the eye, the ellipse opens up
+_PAD_HALF, _PAD = 1e-6, 1e-9  # added to the ellipse's half width, relative; to its middle, relative and absolute
+_CROSSES = 1e-6  # K₃₃ / z² below this, for a frame that magnifies nothing: the ellipse opens up
+_FARTHEST_APART = 1000  # powers of two between the lengths of the rows n
+
+Row = tuple[float, float, float]
 
 
-def screen_boxes(raster: Raster, eye: np.ndarray, centres: np.ndarray, radii: np.ndarray) -> np.ndarray:
-    """Boxes that hold every pixel whose ray may hit: int32 (s, 4), left, right, top, bottom, ends excluded.
+class Lens(NamedTuple):
+    """What the boxes of a picture share. Each row n is without a power of two, so that its squares are in range."""
 
-    The eye (3,), the centres (s, 3) and the radii (s,) are in one unit of length, of anyone's choice. A sphere behind
-    the eye has an empty box, one around the eye or beside it that of the whole picture.
+    nx: Row  # n₁
+    ny: Row  # n₂
+    nz: Row  # n₃
+    zz: float  # n₃·n₃
+    xz: float  # n₁·n₃
+    yz: float
+    cross_x: float  # |n₁ × n₃|²
+    cross_y: float
+    scale_x: float  # U is what the rows give, times this
+    scale_y: float
+    crosses: float
+    width: float  # in pixels
+    height: float
+    shift: float  # of the ray in its pixel, in half pixels
+
+
+class Box(NamedTuple):
+    """Columns from left to right, rows from top to bottom, ends excluded: whole numbers, and nothing if left ≥ right.
+
+    known: nothing else can see the sphere; else the box may be too small. ahead: above 0 if all of it is in front of the
+    eye, below if all is behind.
     """
-    width, height = raster.width, raster.height
-    whole = np.broadcast_to(np.array([0, width, 0, height], np.int32), (len(radii), 4))
-    n = inverse_frame(raster.camera)
-    if n is None:
-        return np.ascontiguousarray(whole)
-    with np.errstate(all="ignore"):
-        n, e = _without_powers_of_two(n)
-        lengths, _ = _without_powers_of_two(np.column_stack([centres - eye, radii]))
-        radii = lengths[:, 3]
-        x, y, z = n @ lengths[:, :3].T
-        r2 = radii * radii
-        k33 = z * z - r2 * (n[2] @ n[2])
-        apart = k33 > _CROSSES * (z * z + r2 * (n[2] @ n[2]))
-        left, right = np.ldexp(_range(x, z, radii, n[0], n[2], k33), e[0] - e[2])
-        bottom, top = np.ldexp(_range(y, z, radii, n[1], n[2], k33), e[1] - e[2])
-        # U = (2x − W) / H and V = (H − 2y) / H, solved for x and y
-        first = np.stack([(left * height + width) / 2, (1 - top) * height / 2])
-        last = np.stack([(right * height + width) / 2, (1 - bottom) * height / 2])
-        size = np.array([[width], [height]])
-        first, end = np.clip(np.floor(first) - 1, 0, size), np.clip(np.ceil(last) + 2, 0, size)
-        box = np.stack([first[0], end[0], first[1], end[1]], axis=1)
-        known = apart & np.isfinite(box).all(axis=1)
-        box = np.where((known & (z > 0))[:, None], box, 0)
-    return np.where(known[:, None], box, whole).astype(np.int32)
+
+    left: Number
+    right: Number
+    top: Number
+    bottom: Number
+    known: Number
+    ahead: Number
 
 
-def _without_powers_of_two(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rows whose largest component is near 1, so that their squares are in range, and the exponents taken out."""
-    exponents = np.frexp(np.abs(rows).max(axis=1, initial=0.0))[1]
-    return np.ldexp(rows, -exponents[:, None]), exponents
+def make_lens(raster: Raster) -> Lens:
+    """Of a frame that magnifies rounding errors too much, one that knows no box."""
+    rows, magnification = inverse_frame(raster.camera) or ([[1.0, 0.0, 0.0]] * 3, inf)
+    exponents = [frexp(max(map(abs, row)))[1] for row in rows]
+    nx, ny, nz = (
+        (ldexp(x, -e), ldexp(y, -e), ldexp(z, -e)) for (x, y, z), e in zip(rows, exponents, strict=True)
+    )
+    cross_x, cross_y = _cross(nx, nz), _cross(ny, nz)
+    width, height, shift = float(raster.width), float(raster.height), float(SAMPLINGS[raster.sampling])
+    up_x, up_y = exponents[0] - exponents[2], exponents[1] - exponents[2]
+    if max(abs(up_x), abs(up_y)) > _FARTHEST_APART:
+        up_x, up_y, magnification = 0, 0, inf
+    return Lens(
+        nx, ny, nz, inner(*nz, *nz), inner(*nx, *nz), inner(*ny, *nz), inner(*cross_x, *cross_x),
+        inner(*cross_y, *cross_y), ldexp(1.0, up_x), ldexp(1.0, up_y), _CROSSES * magnification, width, height, shift,
+    )  # fmt: skip
+
+
+def box_of(lens: Lens, qx: Number, qy: Number, qz: Number, radius: Number) -> Box:
+    """The box of pixels that may see a sphere, Q = centre − eye and its radius in one unit of length.
+
+    Plain arithmetic (see `twofold`); what is beyond it, or not a number, is not known.
+    """
+    nx, ny, nz = lens.nx, lens.ny, lens.nz
+    x = inner(nx[0], nx[1], nx[2], qx, qy, qz)
+    y = inner(ny[0], ny[1], ny[2], qx, qy, qz)
+    z = inner(nz[0], nz[1], nz[2], qx, qy, qz)
+    r2 = radius * radius
+    zz, r2zz = z * z, r2 * lens.zz
+    k33 = zz - r2zz
+    part, half = 1.0 / k33, radius / k33
+    low_x, high_x = _range(x, z, r2, part, half, nx, nz, lens.xz, lens.cross_x, lens.scale_x)
+    low_y, high_y = _range(y, z, r2, part, half, ny, nz, lens.yz, lens.cross_y, lens.scale_y)
+    # U = (2x + shift − W) / H and V = (H − 2y − shift) / H, solved for x and y
+    left, right = _pixels(low_x, high_x, lens.height, lens.width - lens.shift, lens.width)
+    top, bottom = _pixels(-high_y, -low_y, lens.height, lens.height - lens.shift, lens.height)
+    known = (k33 > lens.crosses * (zz + r2zz)) & (right >= 0.0) & (bottom >= 0.0)
+    return Box(left, right, top, bottom, known, z)
 
 
 def _range(
-    x: np.ndarray, z: np.ndarray, radii: np.ndarray, n1: np.ndarray, n3: np.ndarray, k33: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """The ellipse's extent along one axis of the screen, padded."""
-    across = x[:, None] * n3 - z[:, None] * n1
-    normal = np.cross(n1, n3)
-    root = np.sqrt(np.einsum("ij,ij->i", across, across) - radii * radii * (normal @ normal))
-    middle = (x * z - radii * radii * (n1 @ n3)) / k33
-    half = radii * root / k33
-    half = half * (1 + _PAD) + _PAD * np.abs(middle)
-    return middle - half, middle + half
+    x: Number, z: Number, r2: Number, part: Number, half: Number, n: Row, nz: Row, dot: float, cross: float,
+    scale: float,
+) -> tuple[Number, Number]:  # fmt: skip
+    """The ellipse's extent along one axis of the screen, padded; `part` is 1 / K₃₃, `half` is r / K₃₃."""
+    ax, ay, az = x * nz[0] - z * n[0], x * nz[1] - z * n[1], x * nz[2] - z * n[2]
+    root = np.sqrt(inner(ax, ay, az, ax, ay, az) - r2 * cross)
+    middle = (x * z - r2 * dot) * part
+    wide = half * root * (1.0 + _PAD_HALF) + _PAD * abs(middle)
+    return scale * (middle - wide) - _PAD, scale * (middle + wide) + _PAD
+
+
+def _pixels(low: Number, high: Number, unit: float, offset: float, size: float) -> tuple[Number, Number]:
+    """The first pixel from `low` on, and the one after the last up to `high`, within the picture."""
+    first = np.ceil((low * unit + offset) * 0.5)
+    end = np.floor((high * unit + offset) * 0.5) + 1.0
+    return _clipped(first, size), _clipped(end, size)
+
+
+def _clipped(x: Number, size: float) -> Number:
+    low = select(x > 0.0, x, 0.0 * x)  # what is not a number stays so
+    return select(low < size, low, size + 0.0 * low)
+
+
+def _cross(a: Row, b: Row) -> Row:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]

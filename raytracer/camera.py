@@ -13,14 +13,14 @@ from __future__ import annotations
 from decimal import Decimal, localcontext
 from fractions import Fraction
 from functools import lru_cache
-from math import inf, lcm
+from math import hypot, inf, isfinite, lcm
 from operator import index
 from typing import NamedTuple
 
 import numpy as np
 
 from raytracer.arrays import Grid, Rays, TwofoldRays
-from raytracer.certified import in_range
+from raytracer.certified import in_range, inner
 from raytracer.image import check_fits_memory
 from raytracer.scene import Camera
 from raytracer.twofold import Number, Twofold, add, multiply, two_product
@@ -72,6 +72,7 @@ def make_raster(camera: Camera, width: int, height: int, sampling: str = "corner
     return Raster(camera, width, height, sampling)
 
 
+@lru_cache(maxsize=64)
 def _check_camera(camera: Camera) -> None:
     """What the interpreter refuses in a file, for cameras that come from elsewhere."""
     if not (0 < camera.fov < 180 and focal_length(camera.fov) < inf):
@@ -129,26 +130,44 @@ def _whole_frame(camera: Camera) -> tuple[list[int], int]:
     return [int(number * unit) for number in numbers], unit
 
 
-def eye_grid(raster: Raster, rows: slice) -> Grid:
-    """The rays of whole rows of the picture, in factors.
+@lru_cache(maxsize=8)
+def eye_grid(raster: Raster) -> Grid:
+    """The rays of a picture, in factors.
 
     U is rounded once, each product once, each of the two sums once: a component of D is within
-    4u·(|U u| + |V v| + |d w|) of the truth, and `reach` is the length of the vector of those three sums.
+    4u·(|U u| + |V v| + |d w|) of the truth, and `reach` is the length of the longest vector of such sums.
     """
     across, _ = raster.numerators(np.arange(raster.width), 0)
-    _, up = raster.numerators(0, np.arange(rows.start, rows.stop))
-    camera, d = raster.camera, focal_length(raster.camera.fov)
+    _, up = raster.numerators(0, np.arange(raster.height))
+    u, v, d = raster.camera.u, raster.camera.v, focal_length(raster.camera.fov)
     across, up = across / raster.height, up / raster.height
-    back = (d * camera.w[0], d * camera.w[1], d * camera.w[2])
-    widest = np.abs(across).max()
-    sizes = [widest * abs(u) + np.abs(up * v) + abs(b) for u, v, b in zip(camera.u, camera.v, back, strict=True)]
-    return Grid(across, up, camera.u, camera.v, back, in_range(np.sqrt(_square(*sizes))))
+    back = d * raster.camera.w[0], d * raster.camera.w[1], d * raster.camera.w[2]
+    widest, highest = np.abs(across).max(), np.abs(up).max()
+    sizes = [widest * abs(x) + highest * abs(y) + abs(z) for x, y, z in zip(u, v, back, strict=True)]
+    a1 = 2.0 * (up * inner(*u, *v) - inner(*u, *back))
+    a0 = (up * inner(*v, *v) - 2.0 * inner(*v, *back)) * up + inner(*back, *back)
+    return Grid(across, up, a1, a0, inner(*u, *u), u, v, back, float(in_range(np.sqrt(_square(*sizes)))))
+
+
+def rows_of(grid: Grid, rows: slice) -> Grid:
+    """Some rows of the grid."""
+    return grid._replace(up=grid.up[rows], a1=grid.a1[rows], a0=grid.a0[rows])
+
+
+def squares(grid: Grid, rows: slice = slice(None), columns: slice = slice(None)) -> np.ndarray:
+    """D·D of a grid's rays: (rows, columns)."""
+    across = grid.across[None, columns]
+    return (across * grid.a2 + grid.a1[rows, None]) * across + grid.a0[rows, None]
 
 
 def directions(grid: Grid, rows: slice = slice(None), columns: slice = slice(None)) -> Vectors:
     """The directions of a grid's rays, or of some of them: x, y, z, each (rows, columns)."""
-    across, up = grid.across[None, columns], grid.up[rows, None]
-    x, y, z = (across * u + up * v - back for u, v, back in zip(grid.u, grid.v, grid.back, strict=True))
+    return directions_of(grid, grid.across[None, columns], grid.up[rows, None])
+
+
+def directions_of(grid: Grid, across: np.ndarray, up: np.ndarray) -> Vectors:
+    """The directions of the rays with these U and V."""
+    x, y, z = (across * u + (up * v - back) for u, v, back in zip(grid.u, grid.v, grid.back, strict=True))
     return x, y, z
 
 
@@ -180,8 +199,8 @@ def twofold_given_rays(directions: np.ndarray) -> TwofoldRays:
 
 
 @lru_cache(maxsize=64)
-def inverse_frame(camera: Camera) -> np.ndarray | None:
-    """The rows n₁, n₂, n₃ of (u, v, −d·w)⁻¹, or None where it would magnify rounding errors too much."""
+def inverse_frame(camera: Camera) -> tuple[list[list[float]], float] | None:
+    """The rows n₁, n₂, n₃ of (u, v, −d·w)⁻¹ and by how much it magnifies errors; None where that is too much."""
     back = Fraction(focal_length(camera.fov))
     columns = [
         [Fraction(x) for x in camera.u],
@@ -192,12 +211,12 @@ def inverse_frame(camera: Camera) -> np.ndarray | None:
     crosses = [_cross(v, w), _cross(w, u), _cross(u, v)]
     determinant = sum(a * b for a, b in zip(u, crosses[0], strict=True))
     try:
-        rows = np.array([[float(x / determinant) for x in row] for row in crosses])
-        sizes = [np.linalg.norm([float(x) for x in column]) for column in columns]
+        rows = [[float(x / determinant) for x in row] for row in crosses]
+        sizes = [hypot(*map(float, column)) for column in columns]
     except OverflowError:
         return None
-    magnification = max(np.linalg.norm(row) * size for row, size in zip(rows, sizes, strict=True))
-    return rows if magnification < _SKEWED else None
+    magnification = max(hypot(*row) * size for row, size in zip(rows, sizes, strict=True))
+    return (rows, magnification) if magnification < _SKEWED else None
 
 
 def spread(raster: Raster) -> float:
@@ -205,12 +224,10 @@ def spread(raster: Raster) -> float:
 
     n₃·D = 1 for all of them, so |D| ≥ 1 / |n₃|.
     """
-    n = inverse_frame(raster.camera)
-    reach = eye_grid(raster, slice(0, raster.height)).reach.max()
-    if n is None or not np.isfinite(reach):
+    inverse, reach = inverse_frame(raster.camera), eye_grid(raster).reach
+    if inverse is None or not isfinite(reach):
         return inf
-    largest = np.abs(n[2]).max()
-    return float(reach * largest * np.linalg.norm(n[2] / largest))
+    return reach * hypot(*inverse[0][2])
 
 
 def _square(x: Number, y: Number, z: Number) -> Number:

@@ -11,21 +11,25 @@ said to be so, and goes on to the next level: float64, then two-fold float64 (`m
 
 Everything here is plain arithmetic on numbers or arrays alike (see `twofold`). u = 2⁻⁵³ is the unit roundoff.
 
-**The bounds in float64.** m ≥ |D| is the ray's reach; each component of D carries an error of at most 5u·m (eye
-rays), so the vector one of at most 4u·m·(1 + …) in length; l² = L·L + r², and L is rounded once, by u|Lₖ|.
+**The bounds in float64.** m ≥ |D| is the ray's reach, the length of the vector of Σ over a component's three terms of
+their sizes; for rays given in float64, m = |D|. l² = L·L + r², and L is rounded once, by u|Lₖ|.
 
-* h: 4.01u from D, 1.01u from L, 3.01u from three products and two sums: |error| < 9u·m·l.
-* a: 2 · 4.01u from D, 3.01u from the sum: |error| < 12u·m².
-* c: `c_error`, which whoever computed c states; at most 8u·l².
+* h of an eye ray is U·(u·L) + (V·(v·L) + (−d·w)·L): 3.01u for a dot product and 1.01u for L; 1u each for U or V, its
+  product, d·w; 2u for the two sums. No term has more than eight of these: |error| < 9u·m·l. h of a given ray has 1.01u
+  from L and 3.01u from D·L.
+* a of an eye ray is a quadratic in U (`Grid`): 3.01u for a dot product, 2u for U or V twice, 2u for d·w twice, 1u for
+  every other product and sum, and no term has more than eleven: |error| < 12u·m².
+* c: `c_error`, which whoever computed c states; at most 8u·l², in float64 5.1u·l² (L twice, a dot product, r², a sum).
 * disc: h² brings 2 · 9u·(m·l)², a·c brings 12u·m²·|c| + m²·c_error, two products and a difference 4u·(m·l)². As
   |c| ≤ l² that is below 40u·(m·l)² + m²·c_error.
 * √disc: below (error of disc) / √disc. q: that, and twice the error of h (its sign may be wrong by that much).
 
 **Many spheres at once** (`approach`) are put in order by k = a·t = −h − √disc alone, without a division. That is for
-spheres with c ≥ l²/64. As k = a·c/q and q ≤ 2|D|·l, k ≥ |D|·c/2l ≥ m·l / (2κ·l²/c), with κ ≥ m/|D| for all rays of the
-picture. A disc above (rim·m·l)², rim = 88·2⁻²⁶·κ·l²/c, leaves k with an error of 12u·m·l from h and the roundings, and
-of 44u·(m·l)² / (rim·m·l) from the root (44u for 40u covers c_error ≤ 2u·l²): together (24u + 88u/rim)·κ·l²/c·k at most,
-below 2⁻²⁶·k while κ ≤ 64. A smaller disc is for the next level, unless the sphere is behind another anyway.
+spheres with c ≥ l²/64 that lie in front of the eye as a whole. As k = a·c/q and q ≤ 2|D|·l, k ≥ |D|·c/2l ≥
+m·l / (2κ·l²/c), with κ ≥ m/|D| for all rays of the picture. A disc above (rim·m·l)², rim = 96·2⁻²⁶·κ·l²/c, leaves k
+with an error of 12u·m·l from h and the roundings, and of 48u·(m·l)² / (rim·m·l) from the root (c_error ≤ 8u·l²):
+together (24u + 96u/rim)·κ·l²/c·k at most, below 2⁻²⁶·k while κ ≤ 64. A disc below −(rim·m·l)² is a miss, with much to
+spare. Between the two, and where two k differ by less than 2⁻²⁴ of themselves, the next level decides.
 
 **In two-fold arithmetic** the same sums hold with u² = 2⁻¹⁰⁶ for u and constants from `twofold`: D within 16u²·m, a dot
 product 13u², so h and a within 64u² = 2⁻¹⁰⁰ of m·l and m²; c within 16u²·l²; disc within 256u² = 2⁻⁹⁸ of (m·l)².
@@ -73,7 +77,8 @@ SMALLEST, LARGEST = 1e-70, 1e70
 K_ERROR = 2.0**-26
 LARGEST_SPREAD = 64.0
 NEAREST = 64.0
-RIM = 88.0 * 2.0**-26
+RIM = 96.0 * 2.0**-26
+TIE = 4.0 * K_ERROR
 
 # A hit's t is good enough to be shaded when its bound is less than this part of the radius, and of itself. Beyond that
 # lies a rim of a sphere's picture, which must stay narrow: what is in it goes on to the next level.
@@ -86,18 +91,29 @@ def in_range(size: Number) -> Number:
     return select((size > SMALLEST) & (size < LARGEST), size, np.nan)
 
 
-def rim_of(c: Number, size: Number) -> Number:
-    """rim / κ of a sphere seen from an origin, or 0 if it is not far enough outside for `approach`."""
-    square = size * size
-    return select(c * NEAREST >= square, RIM * (square / c), 0.0)
+def edge_of(c: Number, square: Number, m: Number, kappa: Number) -> Number:
+    """(rim·m·l)² of a sphere with l² = square, or 0 if it is not far enough outside for `approach`."""
+    rim = (RIM * kappa) * (square / c)
+    usable = (c * NEAREST >= square) & (square > SMALLEST * SMALLEST) & (square < LARGEST * LARGEST)
+    return select(usable, (rim * rim) * ((m * m) * square), 0.0)
+
+
+def inner(ax: Number, ay: Number, az: Number, bx: Number, by: Number, bz: Number) -> Number:
+    """a · b."""
+    return ax * bx + ay * by + az * bz
+
+
+def side_of(lx: Number, ly: Number, lz: Number, radius: Number) -> tuple[Number, Number]:
+    """c and l² of a sphere whose centre is L away."""
+    square, r2 = inner(lx, ly, lz, lx, ly, lz), radius * radius
+    return square - r2, square + r2
 
 
 def look(ox: Number, oy: Number, oz: Number, cx: Number, cy: Number, cz: Number, radius: Number) -> Six:
     """A sphere as seen from a ray's origin, in float64: L, c and its error, l."""
     lx, ly, lz = ox - cx, oy - cy, oz - cz
-    square = lx * lx + ly * ly + lz * lz
-    size = square + radius * radius
-    return lx, ly, lz, square - radius * radius, C_ERROR * size, in_range(np.sqrt(size))
+    c, square = side_of(lx, ly, lz, radius)
+    return lx, ly, lz, c, C_ERROR * square, in_range(np.sqrt(square))
 
 
 def look_twofold(
@@ -121,11 +137,10 @@ def look_twofold(
 
 
 def meet(
-    lx: Number, ly: Number, lz: Number, c: Number, c_error: Number, l: Number, radius: Number,  # noqa: E741
-    dx: Number, dy: Number, dz: Number, a: Number, m: Number, tolerance: Number = T_TOLERANCE,
+    h: Number, a: Number, c: Number, c_error: Number, l: Number, radius: Number, m: Number,  # noqa: E741
+    tolerance: Number = T_TOLERANCE,
 ) -> Three:  # fmt: skip
     """Where a ray meets a sphere, in float64: t, a bound of its error, and `low`, as `verdict` returns them."""
-    h = dx * lx + dy * ly + dz * lz
     disc = h * h - a * c
     root = np.sqrt(abs(disc))
     q = abs(h) + root
@@ -204,24 +219,20 @@ def discriminant(h: Number, h_low: Number, a: Number, a_low: Number, c: Number, 
     return add(square, square_low, -product, -product_low)
 
 
-def approach(h: Number, a: Number, c: Number, ml: Number, rim: Number, best: Number) -> Three:
-    """For a sphere far enough outside: k = a·t, whether it comes before `best`, and whether nobody knows yet."""
+def approach(h: Number, a: Number, c: Number, edge: Number, best: Number) -> Three:
+    """For a sphere far enough outside: k = a·t, whether it comes before `best`, and whether nobody knows that.
+
+    What nobody knows has to go on to the next level, whatever else is found there.
+    """
     disc = h * h - a * c
-    edge = (rim * rim) * (ml * ml)
-    k = -h - np.sqrt(abs(disc))
-    ahead = (h < 0.0) & (disc >= (-44.0 * U) * (ml * ml))
-    wins = ahead & (disc > edge) & (k * (1.0 + 4.0 * K_ERROR) < best)
-    lowest = select(disc > edge, k, -h - 1.5 * rim * ml) * (1.0 - 4.0 * K_ERROR)
-    undecided = (disc <= edge) | (k * (1.0 + 4.0 * K_ERROR) >= best)
-    return k, wins, ahead & undecided & (lowest <= best)
+    k = -h - np.sqrt(disc)  # not a number for a miss
+    return k, k < best, (abs(disc) <= edge) | (abs(k - best) <= TIE * k)
 
 
 def arrive(t: Number, low: Number, a: Number, best: Number) -> Three:
     """`approach` for what `meet` found, to a tolerance of K_ERROR / 2."""
     k = t * a
-    tie = (t < np.inf) & (k * (1.0 + 4.0 * K_ERROR) >= best) & (k * (1.0 - 4.0 * K_ERROR) <= best)
-    maybe = select(low * a * (1.0 - 4.0 * K_ERROR) > best, False, low < np.inf)  # a NaN is behind nothing
-    return k, k * (1.0 + 4.0 * K_ERROR) < best, tie | maybe
+    return k, k < best, (low < np.inf) | ((t < np.inf) & (abs(k - best) <= TIE * k))
 
 
 def contends(t: Number, error: Number, low: Number, best: Number, best_error: Number) -> Number:

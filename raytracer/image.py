@@ -10,6 +10,8 @@ from typing import IO
 
 import numpy as np
 
+from raytracer.pool import cores
+
 _BYTES_A_PIXEL = 24  # the picture, the hits of all pixels, and room for a PNG encoder
 _BYTES_AT_WORK = 200  # for each pixel that a thread is at work on
 
@@ -23,7 +25,7 @@ def check_fits_memory(width: int, height: int, at_work: int) -> None:
 
     `at_work` is how many pixels each thread works on at a time.
     """
-    needed = width * height * _BYTES_A_PIXEL + (os.cpu_count() or 1) * at_work * _BYTES_AT_WORK
+    needed = width * height * _BYTES_A_PIXEL + cores() * at_work * _BYTES_AT_WORK
     if needed < 1 << 28:
         return
     import psutil  # slow to load, and rarely needed

@@ -1,15 +1,17 @@
 """The numpy path: spheres one after the other, each against many rays at once.
 
-`raytracer.kernels` holds the same four functions, compiled; `plain` is what runs where numba is not installed. Both
-call the formulas of `certified`, and so find the same bits.
+`raytracer.kernels` has the same functions compiled, but for the eye rays of `certified`, for which it has more
+(`raytracer.screen`); this is what runs where numba is not installed, and for small pictures. Both call the formulas of
+`certified`, and so find the same bits.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from raytracer.arrays import Balls, Boxed, First, Grid, Nearest, Rays, Seen, Sides, TwofoldRays, UsualRays
-from raytracer.camera import directions
+from raytracer.arrays import Balls, Candidates, First, Grid, Nearest, Rays, Seen, Sides, TwofoldRays, UsualRays
+from raytracer.boxes import Lens, box_of
+from raytracer.camera import squares
 from raytracer.certified import (
     K_ERROR,
     Three,
@@ -17,100 +19,137 @@ from raytracer.certified import (
     approach,
     arrive,
     contends,
-    distance,
+    edge_of,
+    inner,
     look,
     look_twofold,
     meet,
     meet_twofold,
     nearer,
-    rim_of,
 )
 from raytracer.methods import METHODS, Vector
 
 
-def see(origin: np.ndarray, centres: np.ndarray, radii: np.ndarray) -> Seen:
-    """All spheres, centres (s, 3) and radii (s,), as seen from one origin (3,)."""
-    x, y, z, _, _, _, c, _, c_error, size = look_twofold(*xyz(origin), *xyz(centres), radii, np.nan, 0.0, 0.0)
-    return Seen(x, y, z, c, U * abs(c) + c_error, size, radii, rim_of(c, size))
+def bound(lens: Lens, origin: np.ndarray, balls: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Boxes that hold every pixel whose ray may hit: int32 (s, 4), left, right, top, bottom, ends excluded.
+
+    And whether the sphere is known to be in front of the eye as a whole: bool (s,). The box of one behind the eye is
+    empty, that of one around the eye or beside it is the whole picture.
+    """
+    box = box_of(lens, *xyz(balls[:, :3] - origin), balls[:, 3])
+    whole = np.array([0, lens.width, 0, lens.height])
+    sides = np.stack(box[:4], axis=-1)
+    front = box.known & (box.ahead > 0.0)
+    sides = np.where(front[:, None], sides, np.where(box.known[:, None], 0.0, whole))
+    return sides.astype(np.int32), front
 
 
-def first_of_grid(grid: Grid, seen: Seen, boxes: np.ndarray, first_row: int, kappa: float, first: First) -> None:
+def see(grid: Grid, kappa: float, origin: np.ndarray, balls: np.ndarray, front: np.ndarray) -> Seen:
+    """All spheres (s, 4), x, y, z, radius, as seen from one origin (3,).
+
+    front is what `bound` says; kappa is κ (see `certified`), or 0 where that is not known or too large for `approach`.
+    """
+    eye, places, radii = xyz(origin), xyz(balls), balls[:, 3]
+    x, y, z, c, _, _ = look(*eye, *places, radii)
+    square = inner(x, y, z, x, y, z) + radii * radii
+    edge = np.where(front, edge_of(c, square, grid.reach, kappa), 0.0)
+    _, _, _, _, _, _, fine_c, _, c_error, size = look_twofold(*eye, *places, radii, np.nan, 0.0, 0.0)
+    return Seen(
+        x, y, z, inner(*grid.u, x, y, z), inner(*grid.v, x, y, z), -inner(*grid.back, x, y, z),
+        np.where(edge > 0.0, c, fine_c), U * abs(fine_c) + c_error, size, radii, edge,
+    )  # fmt: skip
+
+
+def first_of_grid(grid: Grid, seen: Seen, boxes: np.ndarray, rows: slice, first: First) -> None:
     """What rays of one origin meet first of the spheres seen from it, each looked for in its box of pixels only.
 
-    boxes is int32 (s, 4): left, right, top, bottom, right and bottom excluded, in pixels of the whole picture; the
-    grid's rows are those from first_row on. kappa is κ (see `certified`), or 0 where that is not known or too large for
-    `approach`.
+    boxes is int32 (s, 4): left, right, top, bottom, right and bottom excluded, in pixels of the whole picture; `first`
+    is of these rows of it.
     """
-    for i, (left, right, top, bottom) in enumerate(boxes.tolist()):
-        rows = slice(max(top - first_row, 0), max(min(bottom - first_row, len(grid.up)), 0))
-        if rows.start < rows.stop and left < right:
-            sphere = Seen._make(array[i] for array in seen)
-            part = First._make(array[rows, left:right] for array in first)
-            k, wins, unsure = _meet_grid(grid, rows, slice(left, right), sphere, kappa, part.k)
-            part.k[...] = np.where(wins, k, part.k)
-            part.index[wins] = i
-            part.unsure[...] |= unsure
+    for i in np.flatnonzero((boxes[:, 2] < rows.stop) & (boxes[:, 3] > rows.start)).tolist():
+        left, right, top, bottom = boxes[i].tolist()
+        box = slice(max(top, rows.start), min(bottom, rows.stop)), slice(left, right)
+        part = First._make(array[box[0].start - rows.start : box[0].stop - rows.start, left:right] for array in first)
+        k, wins, unsure = _meet_grid(grid, *box, Seen._make(array[i] for array in seen), part.k)
+        part.k[...] = np.where(wins, k, part.k)
+        part.index[wins] = i
+        part.unsure[...] |= unsure
 
 
-def distances(grid: Grid, seen: Seen, first: First) -> np.ndarray:
-    """t of the first hits, +inf where there is none."""
-    hit = first.index >= 0
-    dx, dy, dz = (component[hit] for component in directions(grid))
-    lx, ly, lz, c = (array[first.index[hit]] for array in (seen.x, seen.y, seen.z, seen.c))
-    t = np.full(hit.shape, np.inf)
-    h, a = dx * lx + dy * ly + dz * lz, dx * dx + dy * dy + dz * dz
-    t[hit] = distance(h, a, c, np.sqrt(abs(h * h - a * c)))
-    return t
-
-
-def _meet_grid(grid: Grid, rows: slice, columns: slice, sphere: Seen, kappa: float, best: np.ndarray) -> Three:
-    dx, dy, dz = directions(grid, rows, columns)
-    lx, ly, lz, c, c_error, size, radius, rim = sphere
-    a, m = dx * dx + dy * dy + dz * dz, grid.reach[rows, None]
-    if rim * kappa > 0.0:
-        h = dx * lx + dy * ly + dz * lz
-        return approach(h, a, c, m * size, rim * kappa, best)
-    t, _, low = meet(lx, ly, lz, c, c_error, size, radius, dx, dy, dz, a, m, K_ERROR / 2)
+def _meet_grid(grid: Grid, rows: slice, columns: slice, sphere: Seen, best: np.ndarray) -> Three:
+    h = grid.across[None, columns] * sphere.hu + (grid.up[rows, None] * sphere.hv + sphere.hw)
+    a = squares(grid, rows, columns)
+    if sphere.edge > 0.0:
+        return approach(h, a, sphere.c, sphere.edge, best)
+    t, _, low = meet(h, a, sphere.c, sphere.c_error, sphere.size, sphere.radius, grid.reach, K_ERROR / 2)
     return arrive(t, low, a, best)
 
 
-def nearest_given(origins: np.ndarray, rays: Rays, centres: np.ndarray, radii: np.ndarray, nearest: Nearest) -> None:
-    """Rays (n,) from origins (n, 3) against all spheres, centres (s, 3) and radii (s,)."""
-    for i, (centre, radius) in enumerate(zip(centres, radii, strict=True)):
-        _update(nearest, *meet(*look(*xyz(origins), *xyz(centre), radius), radius, *rays), i)
+def nearest_given(origins: np.ndarray, rays: Rays, balls: np.ndarray, nearest: Nearest) -> None:
+    """Rays (n,) from origins (n, 3) against all spheres (s, 4), x, y, z, radius."""
+    for i, ball in enumerate(balls):
+        radius = ball[3]
+        lx, ly, lz, c, c_error, size = look(*xyz(origins), *ball)
+        h = inner(rays.x, rays.y, rays.z, lx, ly, lz)
+        _update(nearest, *meet(h, rays.square, c, c_error, size, radius, rays.reach), i)
 
 
 def nearest_twofold(
     origins: np.ndarray,
     rays: TwofoldRays,
-    boxed: Boxed,
-    centres: np.ndarray,
-    radii: np.ndarray,
+    candidates: Candidates,
+    balls: np.ndarray,
     sides: Sides,
     nearest: Nearest,
 ) -> None:
-    """Rays (n,) from origins (n, 3) against all spheres, in two-fold arithmetic where float64 does not say "behind".
+    """Rays (n,) from origins (n, 3) against their candidates, in two-fold arithmetic where float64 says not "behind".
 
-    sides is what is known of the spheres, seen from all these origins. A sphere equal to one that came earlier in the
+    sides is what is known of some spheres, seen from all these origins. A sphere equal to one that came earlier in the
     file cannot win, and is passed over.
     """
     t_low = np.zeros_like(nearest.t)
-    x, y, z, reach = rays.x, rays.y, rays.z, rays.reach
-    in_float64 = np.stack([x, y, z, x * x + y * y + z * z, reach])
-    for i, (centre, radius) in enumerate(zip(centres, radii, strict=True)):
-        left, right, top, bottom = boxed.boxes[i]
-        some = np.flatnonzero((left <= boxed.x) & (boxed.x < right) & (top <= boxed.y) & (boxed.y < bottom))
-        dx, dy, dz, square, m = in_float64[:, some]
-        rough = meet(*look(*xyz(origins[some]), *xyz(centre), radius), radius, dx, dy, dz, square, m)
+    row = candidates.rows(np.arange(len(origins)))
+    by_sphere = np.argsort(candidates.ids, kind="stable")
+    cuts = np.flatnonzero(np.diff(candidates.ids[by_sphere])) + 1
+    for pairs in np.split(by_sphere, cuts) if len(by_sphere) else ():
+        i, some = int(candidates.ids[pairs[0]]), row[pairs]
+        ball = balls[i]
+        directions = TwofoldRays._make(array[some] for array in rays)
         best = nearest.index[some]
-        twin = (best >= 0) & (radii[best] == radius) & (centres[best] == centre).all(axis=1)
-        some = some[contends(*rough, nearest.t[some], nearest.error[some]) & ~twin]
+        twin = (best >= 0) & (balls[best] == ball).all(axis=1)
+        rough = rough_meeting(origins[some], directions, ball)
+        open_ = contends(*rough, nearest.t[some], nearest.error[some]) & ~twin
+        some, directions = some[open_], TwofoldRays._make(array[open_] for array in directions)
         if some.size:
-            seen = look_twofold(*xyz(origins[some]), *xyz(centre), radius, *Sides._make(array[i] for array in sides))
+            seen = look_twofold(*xyz(origins[some]), *ball, *known_sides(sides, np.array(i)))
             so_far = nearest.t[some], t_low[some], nearest.error[some], nearest.index[some], nearest.unsure[some]
-            found = nearer(*so_far, *meet_twofold(*seen, *TwofoldRays._make(array[some] for array in rays)), i)
+            found = nearer(*so_far, *meet_twofold(*seen, *directions), i)
             for array, value in zip((nearest.t, t_low, *nearest[1:]), found, strict=True):
                 array[some] = value
+
+
+def rough_meeting(origins: np.ndarray, rays: TwofoldRays, balls: np.ndarray) -> Three:
+    """`meet` for rays that are known to twice the digits: one sphere (4,) for all rays (n,), or one each (n, 4)."""
+    radius = balls[..., 3]
+    lx, ly, lz, c, c_error, size = look(*xyz(origins), *xyz(balls), radius)
+    square = inner(rays.x, rays.y, rays.z, rays.x, rays.y, rays.z)
+    return meet(inner(rays.x, rays.y, rays.z, lx, ly, lz), square, c, c_error, size, radius, rays.reach)
+
+
+def known_sides(sides: Sides, which: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """c, its rest and its error of these spheres; NaN where nothing is known."""
+    place = np.searchsorted(sides.which, which)
+    found = np.append(sides.which, -1)[place] == which
+    c, low, error = (np.append(array, 0.0)[place] for array in sides[1:])
+    return np.where(found, c, np.nan), np.where(found, low, 0.0), np.where(found, error, 0.0)
+
+
+def candidates_of(boxes: np.ndarray, xs: np.ndarray, ys: np.ndarray) -> Candidates:
+    """The spheres in whose boxes (s, 4) the pixels in columns xs and rows ys lie."""
+    found = [np.flatnonzero((boxes[:, 0] <= x) & (x < boxes[:, 1]) & (boxes[:, 2] <= y) & (y < boxes[:, 3]))
+             for x, y in zip(xs.tolist(), ys.tolist(), strict=True)]  # fmt: skip
+    starts = np.cumsum([0, *map(len, found)], dtype=np.int64)
+    return Candidates(starts, np.concatenate([np.empty(0, np.int32), *found]).astype(np.int32))
 
 
 def usual_eye(
@@ -147,10 +186,12 @@ def usual_given(
         np.minimum(t, found, out=t)
 
 
-def polish(origins: np.ndarray, rays: TwofoldRays, centres: np.ndarray, radii: np.ndarray, sides: Sides) -> np.ndarray:
-    """t of rays (n,), each against its own sphere, to the last digit; +inf where two-fold arithmetic is not certain."""
-    t, _, _, _ = meet_twofold(*look_twofold(*xyz(origins), *xyz(centres), radii, *sides), *rays)
-    return t
+def polish(origins: np.ndarray, rays: TwofoldRays, balls: np.ndarray, known: tuple[np.ndarray, ...]) -> np.ndarray:
+    """t of rays (n,), each against its own sphere (n, 4), to the last digit; +inf where two-fold arithmetic is not certain.
+
+    known is what `known_sides` says of those spheres.
+    """
+    return meet_twofold(*look_twofold(*xyz(origins), *xyz(balls), balls[:, 3], *known), *rays)[0]
 
 
 def xyz(vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sized
 from dataclasses import dataclass
+from functools import cached_property
+from types import ModuleType
+
+import numpy as np
 
 from raytracer import backend, plain
 from raytracer.camera import Raster, make_raster
+from raytracer.eye import Eye, open_eye
 from raytracer.methods import CERTIFIED, METHODS, check_method
 from raytracer.scene import Light, Scene
-from raytracer.stages import STAGES, Stage
-from raytracer.trace import Eye, open_eye
+from raytracer.stages import LIGHT_RANGE, STAGES, Stage, light_from_eye
 
 _TESTS_A_LIGHT = 20  # what shading by a light costs, in tests of a ray against a sphere
 
@@ -20,19 +24,62 @@ class Plan:
     """Everything that is decided before the first ray is shot."""
 
     scene: Scene
+    name: str  # of the stage
     stage: Stage
     raster: Raster
-    eye: Eye
-    truth: Eye | None  # traces the true hits, for a stage that wants them
+    method: str
     lights: tuple[Light, ...]
-    why: tuple[str, ...]  # sentences for a person: what is computed, what is not, and the reason
-    warnings: tuple[str, ...]  # those that a person should see unasked
+    forced: ModuleType | None = None  # who traces, if it is not to be chosen
+
+    @cached_property
+    def eye(self) -> Eye:
+        """The spheres in view, for whoever traces them one after the other."""
+        return open_eye(self.scene, self.raster, self.method, self.forced)
+
+    @cached_property
+    def truth(self) -> Eye:
+        """The same for the true hits."""
+        return open_eye(self.scene, self.raster, path=self.forced)
+
+    @cached_property
+    def path(self) -> ModuleType:
+        """Who traces: `raytracer.plain` or `raytracer.kernels`."""
+        return self.forced or backend.loaded() or self.eye.path
 
     @property
-    def bands(self) -> list[slice]:
-        """The picture's rows, cut into pieces that are drawn one at a time; thinner ones where a pixel takes long."""
-        pixels = self.raster.width * self.raster.height
-        return self.raster.bands(self.eye.tests / pixels + _TESTS_A_LIGHT * len(self.lights))
+    def path_name(self) -> str:
+        """ "numpy" or "compiled"."""
+        return "numpy" if self.path is plain else "compiled"
+
+    @property
+    def on_screen(self) -> bool:
+        """Whether the spheres are sorted into tiles of the screen, and traced there."""
+        return self.method == CERTIFIED and self.path is not plain
+
+    @cached_property
+    def painter(self) -> str:
+        """The kernel that paints the whole stage, or nothing if numpy does."""
+        return self.stage.painter if self.on_screen and not self._has_far_lights else ""
+
+    @property
+    def _has_far_lights(self) -> bool:
+        places = [light_from_eye(light, self.scene.camera, 0) for light in self.lights]
+        return bool(places) and not np.abs(places).max() < 2.0**LIGHT_RANGE
+
+    @property
+    def shading(self) -> float:
+        """What a pixel's shading costs, in tests of a ray against a sphere."""
+        return _TESTS_A_LIGHT * len(self.lights)
+
+    @cached_property
+    def why(self) -> tuple[str, ...]:
+        """Sentences for a person: what is computed, what is not, and the reason."""
+        return (*_reasons(self), *self.warnings)
+
+    @cached_property
+    def warnings(self) -> tuple[str, ...]:
+        """Those that a person should see unasked."""
+        return tuple(_warnings(self.scene))
 
 
 def make_plan(
@@ -42,28 +89,30 @@ def make_plan(
     height: int = 320,
     sampling: str = "corner",
     method: str = CERTIFIED,
+    path: ModuleType | None = None,
 ) -> Plan:
-    """The plan for a picture; ValueError for a stage, a size, a sampling or a method that there is not."""
+    """The plan for a picture; ValueError for a stage, a size, a sampling or a method that there is not.
+
+    `path` is `raytracer.plain` or `raytracer.kernels`, and chosen by default.
+    """
     if stage not in STAGES:
         raise ValueError(f"found stage {stage!r}, expected one of {', '.join(STAGES)}")
     row, raster = STAGES[stage], make_raster(scene.camera, width, height, sampling)
     check_method(method)
-    eye = open_eye(scene, raster, method)
-    truth = open_eye(scene, raster) if row.needs_truth else None
-    lights = _lights_that_matter(scene) if row.needs_lights else ()
-    warnings = tuple(_warnings(scene))
-    return Plan(
-        scene, row, raster, eye, truth, lights, (*_reasons(scene, stage, row, eye, lights), *warnings), warnings
-    )
+    return Plan(scene, stage, row, raster, method, _lights_that_matter(scene) if row.needs_lights else (), path)
 
 
 def _lights_that_matter(scene: Scene) -> tuple[Light, ...]:
     return tuple(light for light in scene.lights if any(light.colour))
 
 
-def _reasons(scene: Scene, name: str, stage: Stage, eye: Eye, lights: tuple[Light, ...]) -> Iterator[str]:
-    yield f"stage {name}: {stage.about}"
-    yield from _reasons_for_tracing(scene, eye)
+def _reasons(plan: Plan) -> Iterator[str]:
+    scene, stage, lights = plan.scene, plan.stage, plan.lights
+    yield f"stage {plan.name}: {stage.about}"
+    if stage.needs_hits:
+        yield from _reasons_for_tracing(plan)
+    else:
+        yield "no ray is shot: the boxes of pixels that can see a sphere are all that is counted"
     if not stage.needs_normals:
         yield "no point, no normal: this stage asks only what is hit"
     if not stage.needs_lights:
@@ -85,27 +134,28 @@ def _reasons(scene: Scene, name: str, stage: Stage, eye: Eye, lights: tuple[Ligh
         yield "the whole picture's hits are kept: this stage compares pixels with each other"
 
 
-def _reasons_for_tracing(scene: Scene, eye: Eye) -> Iterator[str]:
-    radii, on = eye.targets.radii, eye.targets.sides.c == 0
-    total, seen = len(scene.spheres), len(radii)
+def _reasons_for_tracing(plan: Plan) -> Iterator[str]:
+    eye, scene = plan.eye, plan.scene
+    total, seen = len(scene.spheres), len(eye.order)
     if seen < total:
         yield f"{_count(range(total - seen), 'sphere')} of {total} cannot be seen: behind the eye or beside the picture"
     if not seen:
         yield "no sphere in view: no ray is shot"
         return
-    pixels = eye.raster.width * eye.raster.height
+    pixels = plan.raster.width * plan.raster.height
+    how = "sorted into tiles of the screen, each tested" if plan.on_screen else "tested one after the other, each"
     yield (
-        f"{_count(radii, 'sphere')}: tested one after the other, each within the box of pixels that can see it, "
+        f"{_count(range(seen), 'sphere')}: {how} within the box of pixels that can see it, "
         f"{eye.tests / pixels:.3g} tests a pixel"
     )
-    if eye.targets.path is plain and not backend.why_no_compiler():
+    if plan.path is plain and not backend.why_no_compiler():
         yield "few tests: numpy is done before the compiler would be loaded"
-    if on.any():
-        yield f"the eye lies exactly on {_count(range(int(on.sum())), 'sphere')}: the hit at t = 0 does not count"
-    if eye.method == CERTIFIED:
+    if on := int((eye.targets.sides.c == 0).sum()):
+        yield f"the eye lies exactly on {_count(range(on), 'sphere')}: the hit at t = 0 does not count"
+    if plan.method == CERTIFIED:
         yield "every decision certain: float64, where that cannot tell two-fold float64, then integers"
     else:
-        yield f"method {eye.method}: {METHODS[eye.method].about}; what rounding makes of it is what is drawn"
+        yield f"method {plan.method}: {METHODS[plan.method].about}; what rounding makes of it is what is drawn"
 
 
 def _warnings(scene: Scene) -> Iterator[str]:

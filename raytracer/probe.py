@@ -15,13 +15,13 @@ import numpy as np
 from raytracer import certified, exact, methods, plain
 from raytracer.camera import directions, eye_grid, twofold_eye_rays
 from raytracer.exact import Root, quotient
+from raytracer.eye import Eye
 from raytracer.image import to_bytes
 from raytracer.methods import CERTIFIED, METHODS
 from raytracer.plan import Plan, make_plan
-from raytracer.render import draw_rows, trace_whole
+from raytracer.render import block_of, open_tracer, whole_of
 from raytracer.scene import Colour, Scene, Shape, Sphere, Vector, vector
 from raytracer.stages import Block
-from raytracer.trace import Eye, level, polished_rows
 
 _DIGITS = 17  # of a float64
 _MOST_SHAPES = 8
@@ -156,9 +156,9 @@ def probe_pixel(
         raise ValueError(f"found pixel {x} {y}, expected one within 0 0 and {width - 1} {height - 1}")
     plan = make_plan(scene, stage, width, height, sampling, method)
     row = slice(y, y + 1)
-    rays, hits = directions(eye_grid(plan.raster, row)), polished_rows(plan.eye, row)
+    rays, hits = directions(eye_grid(plan.raster), row), plan.eye.hits(row, polished=True)
     block = Block(scene, plan.raster, row, hits, scene.lights)
-    colour = draw_rows(plan, row, trace_whole(plan) if plan.stage.needs_whole else None)[0, x]
+    colour = _colour(plan, row)[x]
     index, point, normal = int(hits.index[0, x]), None, None
     if index >= 0:
         k = int(np.count_nonzero(block.hit[0, :x]))
@@ -166,7 +166,7 @@ def probe_pixel(
     meetings = _meetings(plan, x, y)
     others = [m.true_t if method == CERTIFIED else m.t for m in meetings if m.index != index]
     lead = min(others, default=np.inf) - float(hits.t[0, x]) if index >= 0 else np.inf
-    certainty = level(plan.eye, x, y) if method == CERTIFIED else ""
+    certainty = plan.eye.level(x, y) if method == CERTIFIED else ""
     return Pixel(
         x, y, width, height, stage, method, scene.camera.eye, vector(np.array(rays)[:, 0, x]),
         plan.raster.exact_direction(x, y), index, scene.shape(index) if index >= 0 else None, float(hits.t[0, x]),
@@ -174,6 +174,15 @@ def probe_pixel(
         tuple(_lightings(block, k)) if index >= 0 and plan.stage.needs_lights else (),
         vector(colour), _bytes(to_bytes(colour)),
     )  # fmt: skip
+
+
+@np.errstate(all="ignore")
+def _colour(plan: Plan, row: slice) -> np.ndarray:
+    """The stage's colours of one row, (width, 3)."""
+    with open_tracer(plan) as tracer:
+        whole = whole_of(plan, tracer)
+    colours: np.ndarray = plan.stage.colours(block_of(plan, plan.eye, row, whole=whole))[0]
+    return colours
 
 
 def _lightings(block: Block, k: int) -> Iterator[Lighting]:
@@ -230,9 +239,7 @@ def _one(method: str, origin: Vector, ray: Any, sphere: Sphere) -> Any:
     """One ray against one sphere, in numpy."""
     row = METHODS[method]
     if row.function is None:
-        seen = plain.see(np.array(origin), np.array([sphere.centre]), np.array([sphere.radius]))
-        square = ray.x * ray.x + ray.y * ray.y + ray.z * ray.z
-        t, _, low = certified.meet(*seen[:7], ray.x, ray.y, ray.z, square, ray.reach)
+        t, _, low = plain.rough_meeting(np.array([origin]), ray, np.array([*sphere.centre, sphere.radius]))
         return np.where(low < np.inf, np.nan, t)
     to = row.precision
     vectors = [(to(ray.x[0]), to(ray.y[0]), to(ray.z[0])), (ray.x_low[0], ray.y_low[0], ray.z_low[0])]

@@ -6,20 +6,22 @@ picture = render_scene(interpreter("scenes/01_one_sphere.cli"), stage="diffuse")
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 
 import numpy as np
 
+from raytracer import backend
 from raytracer.arrays import Hits
-from raytracer.camera import Raster, make_raster
+from raytracer.eye import Eye, count_tests
 from raytracer.image import to_bytes
-from raytracer.methods import CERTIFIED, check_method
+from raytracer.methods import CERTIFIED
 from raytracer.plan import Plan, make_plan
+from raytracer.pool import share
 from raytracer.scene import Scene
+from raytracer.screen import Pixels, Screen, make_canvas, make_paints, open_screen
 from raytracer.stages import Block, Whole
-from raytracer.trace import open_eye, polished_rows, trace_rows
 
 Progress = Callable[[int, int, slice], object]
 
@@ -63,44 +65,124 @@ def draw(
     """`render_scene` for whoever has made the plan already."""
     shape = plan.raster.height, plan.raster.width, 3
     picture = np.empty(shape, np.uint8) if out is None else _fitting(out, shape)
-    whole = trace_whole(plan, threads, progress, cancelled) if plan.stage.needs_whole else None
-
-    def draw_band(rows: slice) -> slice:
-        picture[rows] = to_bytes(draw_rows(plan, rows, whole))
-        return rows
-
-    _each_band(plan.bands, draw_band, threads, progress, cancelled, done=len(plan.bands) if whole else 0)
+    if plan.painter and make_canvas(picture) is None:
+        picture[...] = draw(plan, threads=threads, progress=progress, cancelled=cancelled)
+        return picture
+    with open_tracer(plan, threads) as tracer:
+        watch = Watch(threads, progress, cancelled, rounds=2 if plan.stage.needs_whole else 1)
+        if plan.painter:
+            assert isinstance(tracer, Screen)
+            _paint(plan, tracer, picture, watch)
+        else:
+            whole = whole_of(plan, tracer, watch)
+            share_bands(tracer, plan, watch, lambda rows, worker: _draw_rows(plan, tracer, rows, worker, whole, picture))
     return picture
 
 
-def draw_rows(plan: Plan, rows: slice, whole: Whole | None) -> np.ndarray:
-    """The stage's colours for some rows, neither clipped nor rounded: float64 (rows, width, 3)."""
-    truth = None
-    if whole is not None:
-        hits = Hits(whole.hits.t[rows], whole.hits.index[rows])
-    elif plan.truth is not None:
-        hits, truth = polished_rows(plan.eye, rows), polished_rows(plan.truth, rows)
+@contextmanager
+def open_tracer(plan: Plan, threads: int | None = None) -> Iterator[Eye | Screen]:
+    """Who finds the hits of a picture, as long as the context lasts."""
+    if plan.on_screen:
+        with open_screen(plan.scene, plan.raster, plan.path, threads) as screen:
+            yield screen
     else:
-        hits = trace_rows(plan.eye, rows)
-    with np.errstate(all="ignore"):
-        return plan.stage.colours(Block(plan.scene, plan.raster, rows, hits, plan.lights, whole, truth))
+        yield plan.eye
 
 
-def trace_whole(
-    plan: Plan,
-    threads: int | None = None,
-    progress: Progress | None = None,
-    cancelled: Callable[[], bool] | None = None,
-) -> Whole:
-    """The hits of the whole picture, for a stage that wants them before it draws the first pixel: half of its work."""
-    hits = _empty_hits(plan.raster)
+@dataclass
+class Watch:
+    """Who is told how far a picture has come, and who is asked whether it is still wanted."""
 
-    def trace(rows: slice) -> slice:
-        hits.t[rows], hits.index[rows] = trace_rows(plan.eye, rows)
+    threads: int | None = None
+    progress: Progress | None = None
+    cancelled: Callable[[], bool] | None = None
+    rounds: int = 1  # how often the picture's rows are gone through
+    done: int = 0
+
+
+def share_bands(tracer: Eye | Screen, plan: Plan, watch: Watch, work: Callable[[slice, int], slice]) -> None:
+    """Do the work for all rows of the picture, a band at a time, on all threads.
+
+    Work returns the rows of the picture that it has finished.
+    """
+    bands = tracer.bands(plan.shading)
+
+    def one(rows: slice, worker: int) -> slice:
+        if watch.cancelled is not None and watch.cancelled():
+            raise Cancelled
+        return work(rows, worker)
+
+    def tell(rows: slice) -> None:
+        watch.done += 1
+        if watch.progress is not None:
+            watch.progress(watch.done, watch.rounds * len(bands), rows)
+
+    share(bands, one, watch.threads, tell)
+
+
+def _paint(plan: Plan, screen: Screen, picture: np.ndarray, watch: Watch) -> None:
+    """A stage that a kernel paints; numpy paints the pixels that float64 was not certain of."""
+    paints, canvas = make_paints(plan, screen), make_canvas(picture)
+    assert canvas is not None
+
+    def decide(doubtful: Pixels) -> None:
+        hits = screen.in_scene(doubtful.hits())
+        block = Block(plan.scene, plan.raster, doubtful.ys, hits, plan.lights, doubtful.xs)
+        picture[doubtful.ys, doubtful.xs] = _colours(plan, block)
+
+    def paint(rows: slice, worker: int) -> slice:
+        for doubtful in screen.paint(plan.painter, rows, worker, paints, canvas):
+            decide(doubtful)
+        return rows
+
+    share_bands(screen, plan, watch, paint)
+    for doubtful in screen.doubtful(*range(len(screen.desks))):
+        decide(doubtful)
+
+
+def _draw_rows(
+    plan: Plan, tracer: Eye | Screen, rows: slice, worker: int, whole: Whole | None, picture: np.ndarray
+) -> slice:
+    picture[rows] = _colours(plan, block_of(plan, tracer, rows, worker, whole))
+    return rows
+
+
+@np.errstate(all="ignore")
+def _colours(plan: Plan, block: Block) -> np.ndarray:
+    """The stage's colours of a block, as bytes."""
+    return to_bytes(plan.stage.colours(block))
+
+
+def block_of(plan: Plan, tracer: Eye | Screen, rows: slice, worker: int = 0, whole: Whole | None = None) -> Block:
+    """What the stage has to know of some rows."""
+    stage, truth, hits = plan.stage, None, _no_hits(rows, plan.raster.width)
+    if whole is not None and whole.hits is not None:
+        hits = Hits(whole.hits.t[rows], whole.hits.index[rows])
+    elif stage.needs_hits:
+        hits = tracer.hits(rows, worker, polished=stage.needs_truth)
+    if stage.needs_truth:
+        truth = hits if plan.method == CERTIFIED else plan.truth.hits(rows, polished=True)
+    tests = None if whole is None or whole.tests is None else whole.tests[rows]
+    return Block(plan.scene, plan.raster, rows, hits, plan.lights, None, whole, truth, tests)
+
+
+def whole_of(plan: Plan, tracer: Eye | Screen, watch: Watch | None = None) -> Whole | None:
+    """What a stage wants to know of the whole picture before it draws the first pixel."""
+    if plan.stage.needs_tests:
+        return Whole(None, count_tests(tracer.boxes, plan.raster))
+    return Whole(hits_of(plan, tracer, watch)) if plan.stage.needs_whole else None
+
+
+def hits_of(plan: Plan, tracer: Eye | Screen, watch: Watch | None = None, polished: bool = False) -> Hits:
+    """The hits of the whole picture."""
+    hits = _no_hits(slice(0, plan.raster.height), plan.raster.width)
+
+    def trace(rows: slice, worker: int) -> slice:
+        hits.t[rows], hits.index[rows] = tracer.hits(rows, worker, polished)
         return slice(rows.start, rows.start)
 
-    _each_band(plan.bands, trace, threads, progress, cancelled, ahead=len(plan.bands))
-    return Whole(hits)
+    share_bands(tracer, plan, watch or Watch(), trace)
+    return hits
 
 
 def eye_hits(
@@ -117,50 +199,26 @@ def eye_hits(
     index is the shape's place among all shapes of the file; `scene.shape(index)` is the shape. t counts multiples of
     the ray's direction, which is not normalised.
     """
-    raster = make_raster(scene.camera, width, height, sampling)
-    check_method(method)
-    eye, hits = open_eye(scene, raster, method), _empty_hits(raster)
-
-    def trace(rows: slice) -> slice:
-        hits.t[rows], hits.index[rows] = polished_rows(eye, rows)
-        return rows
-
-    _each_band(raster.bands(eye.tests / (raster.width * raster.height)), trace, threads, None, None)
-    return hits
+    plan = make_plan(scene, "hit", width, height, sampling, method)
+    with open_tracer(plan, threads) as tracer:
+        return hits_of(plan, tracer, Watch(threads), polished=True)
 
 
-def _each_band(
-    bands: list[slice],
-    work: Callable[[slice], slice],
-    threads: int | None,
-    progress: Progress | None,
-    cancelled: Callable[[], bool] | None,
-    done: int = 0,
-    ahead: int = 0,
-) -> None:
-    """Do the work for all bands, on a pool of threads; the first exception ends it.
+def warm_up(scene: Scene, stage: str, method: str = CERTIFIED) -> bool:
+    """Have the kernels ready, machine code and all, that a picture needs; False if there is no compiler.
 
-    Work returns the rows of the picture that it has finished. `done` and `ahead` count bands of other work.
+    To make machine code takes seconds, once. The backend learns of the kernels only afterwards, and draws without them
+    in the meantime.
     """
-
-    def one(rows: slice) -> slice:
-        if cancelled is not None and cancelled():
-            raise Cancelled
-        return work(rows)
-
-    with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
-        try:
-            for count, future in enumerate(as_completed([pool.submit(one, rows) for rows in bands]), done + 1):
-                rows = future.result()
-                if progress is not None:
-                    progress(count, done + len(bands) + ahead, rows)
-        except BaseException:
-            pool.shutdown(cancel_futures=True)
-            raise
+    kernels = backend.import_kernels()
+    if kernels is not None:
+        draw(make_plan(scene, stage, 16, 16, method=method, path=kernels))
+        backend.load()
+    return kernels is not None
 
 
-def _empty_hits(raster: Raster) -> Hits:
-    shape = (raster.height, raster.width)
+def _no_hits(rows: slice, width: int) -> Hits:
+    shape = (rows.stop - rows.start, width)
     return Hits(np.empty(shape), np.empty(shape, np.int32))
 
 

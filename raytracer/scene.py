@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TypeVar, overload
 
@@ -119,6 +120,16 @@ class Materials(_Table[Material]):
 
     table: np.ndarray = field(default_factory=lambda: np.empty((0, 11)))  # (m, 11) float64
 
+    def arrays(self) -> list[np.ndarray]:
+        return [self.table]
+
+    @cached_property
+    def diffuse(self) -> np.ndarray:
+        """The diffuse colours alone, as rows r, g, b, 0: float64 (m, 4)."""
+        rows = np.zeros((len(self.table), 4))
+        rows[:, :3] = self.table[:, :3]
+        return rows
+
     def _row(self, i: int) -> Material:
         row = self.table[i]
         return Material(vector(row[0:3]), vector(row[3:6]), vector(row[6:9]), float(row[9]), float(row[10]))
@@ -126,16 +137,43 @@ class Materials(_Table[Material]):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Spheres(_Table[Sphere]):
-    """Spheres as arrays. `order` is the place of each among all shapes of the file, counted from 0, ascending."""
+    """Spheres as arrays. `order` is the place of each among all shapes of the file, counted from 0, ascending.
+
+    Radii and centres are kept as one array, in which a sphere is a row: whoever looks at it finds all four together.
+    """
 
     radii: np.ndarray = field(default_factory=lambda: np.empty(0))  # (n,) float64
     centres: np.ndarray = field(default_factory=lambda: np.empty((0, 3)))  # (n, 3) float64
     material: np.ndarray = field(default_factory=lambda: np.empty(0, np.int32))  # (n,) int32, row of `materials`
     order: np.ndarray = field(default_factory=lambda: np.empty(0, np.int32))  # (n,) int32
     materials: Materials = Materials()
+    balls: np.ndarray = field(init=False)  # (n rounded up to eights, 4) float64: x, y, z, radius; NaN in rows to spare
+
+    def __post_init__(self) -> None:
+        balls = pack_balls(self.centres, self.radii)
+        balls.flags.writeable = False
+        object.__setattr__(self, "balls", balls)
+        object.__setattr__(self, "centres", self.balls[: len(self.radii), :3])
+        object.__setattr__(self, "radii", self.balls[: len(self.radii), 3])
+        super().__post_init__()
+
+    def arrays(self) -> list[np.ndarray]:
+        return [self.radii, self.centres, self.material, self.order]
+
+    @cached_property
+    def largest(self) -> float:
+        """The largest number among centres and radii, without its sign; 0 if there is none."""
+        return float(np.abs(self.balls[: len(self)]).max(initial=0.0))
 
     def _row(self, i: int) -> Sphere:
         return Sphere(float(self.radii[i]), vector(self.centres[i]), self.materials[self.material[i]])
+
+
+def pack_balls(centres: np.ndarray, radii: np.ndarray) -> np.ndarray:
+    """Spheres as rows x, y, z, radius: float64 (n rounded up to eights, 4), NaN in rows to spare."""
+    balls = np.full((-(-len(radii) // 8) * 8, 4), np.nan)
+    balls[: len(radii), :3], balls[: len(radii), 3] = centres, radii
+    return balls
 
 
 @dataclass(frozen=True, eq=False, repr=False)

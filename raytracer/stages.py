@@ -12,31 +12,40 @@ from functools import cached_property
 
 import numpy as np
 
+from raytracer import shading
 from raytracer.arrays import Hits
-from raytracer.camera import Raster, directions, eye_grid
-from raytracer.scene import Light, Scene
+from raytracer.camera import Raster, Vectors, directions, directions_of, eye_grid
+from raytracer.scene import Camera, Colour, Light, Scene
+from raytracer.units import sphere_units
 
 DUMMY = (0.8, 0.2, 0.3)
 BLACK, WHITE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
 _TOO_DARK = 0.1  # a background with no channel above this does not show black
 _FARTHEST_GREY = 0.15
 
+Scale = tuple[tuple[float, Colour], ...]  # numbers, ascending, and the colours that stand for them
+
 
 @dataclass(frozen=True)
 class Block:
-    """The hits of some rows of the picture, and what can be asked about them. Computed when asked for, and once."""
+    """The hits of some pixels, and what can be asked about them. Computed when asked for, and once.
+
+    The pixels are some rows of the picture or a list of them; `hits`, `truth` and `tests` are of their shape.
+    """
 
     scene: Scene
     raster: Raster
-    rows: slice
-    hits: Hits  # of these rows: t and index, shape (rows, width)
+    rows: slice | np.ndarray  # rows of the picture; or int (n,), the row of each pixel
+    hits: Hits  # t and index, shape (rows, width) or (n,)
     lights: tuple[Light, ...] = ()  # those that can be seen at all
+    columns: np.ndarray | None = None  # int (n,), the column of each pixel; None for whole rows
     whole: Whole | None = None  # the hits of the whole picture, for a stage that looks beyond its rows
-    truth: Hits | None = None  # the true hits of these rows, for a stage that judges the method
+    truth: Hits | None = None  # the true hits of these pixels, for a stage that judges the method
+    tests: np.ndarray | None = None  # int32, how many spheres each pixel is tested against, for a stage that counts
 
     @cached_property
     def hit(self) -> np.ndarray:
-        """Where anything is hit: bool (rows, width). The arrays below have one row for each such pixel, in order."""
+        """Where anything is hit: bool, one a pixel. The arrays below have one row for each hit pixel, in order."""
         return self.hits.index >= 0
 
     @cached_property
@@ -46,18 +55,44 @@ class Block:
         return np.searchsorted(self.scene.spheres.order, shape) if len(self.scene.triangles) else shape
 
     @cached_property
+    def _directions(self) -> Vectors:
+        grid = eye_grid(self.raster)
+        if self.columns is None:
+            return directions(grid, self.rows)
+        return directions_of(grid, grid.across[self.columns], grid.up[self.rows])
+
+    @cached_property
+    def _unit(self) -> int:
+        """Lengths are counted in 2**unit where their squares would be beyond float64."""
+        return sphere_units(self.scene.camera.eye, self.scene.spheres)[0]
+
+    @cached_property
+    def _from_eye(self) -> Vectors:
+        """P, from the eye to the hit point, in units: three arrays (hits,)."""
+        t = np.ldexp(self.hits.t[self.hit], -self._unit)
+        x, y, z = (t * component[self.hit] for component in self._directions)
+        return x, y, z
+
+    @cached_property
+    def _from_centre(self) -> Vectors:
+        """r·N, from the sphere's centre to the hit point, in units: three arrays (hits,)."""
+        eye, centres = (np.ldexp(x, -self._unit) for x in (self.scene.camera.eye, self._balls))
+        x, y, z = (eye[k] - centres[:, k] + self._from_eye[k] for k in range(3))
+        return x, y, z
+
+    @cached_property
+    def _balls(self) -> np.ndarray:
+        return self.scene.spheres.balls[self._sphere]
+
+    @cached_property
     def from_eye(self) -> np.ndarray:
         """From the eye to the hit point: (hits, 3). Keeps digits that the point itself may not have."""
-        rays = directions(eye_grid(self.raster, self.rows))
-        t = self.hits.t[self.hit]
-        return np.stack([t * component[self.hit] for component in rays], axis=1)
+        return np.ldexp(np.stack(self._from_eye, axis=-1), self._unit)
 
     @cached_property
     def normals(self) -> np.ndarray:
         """Unit normals at the hit points, outwards: (hits, 3)."""
-        spheres = self.scene.spheres
-        from_centre = (self.scene.camera.eye - spheres.centres[self._sphere]) + self.from_eye
-        return from_centre / spheres.radii[self._sphere][:, None]
+        return np.stack(self._from_centre, axis=-1) / np.ldexp(self._balls[:, 3], -self._unit)[:, None]
 
     @cached_property
     def points(self) -> np.ndarray:
@@ -68,6 +103,15 @@ class Block:
         """Unit vectors from the hit points to a light: (hits, 3); zero where the light is at the point itself."""
         return _unit(np.subtract(light.position, self.scene.camera.eye) - self.from_eye)
 
+    def cosine(self, light: Light) -> np.ndarray:
+        """max(0, N·L) of a light: (hits,)."""
+        place = light_from_eye(light, self.scene.camera, self._unit)
+        nearer = max(0, int(np.frexp(np.abs(place).max())[1]) - LIGHT_RANGE)
+        p = tuple(np.ldexp(x, -nearer) for x in self._from_eye) if nearer else self._from_eye
+        x, y, z = np.ldexp(place, -nearer).tolist()
+        facing, square = shading.towards(p, self._from_centre, (x, y, z))
+        return shading.cosine(facing, square, np.ldexp(self._balls[:, 3], -self._unit))
+
     @cached_property
     def diffuse(self) -> np.ndarray:
         """Diffuse colours of what is hit: (hits, 3)."""
@@ -76,44 +120,60 @@ class Block:
     def paint(
         self, colours: np.ndarray | tuple[float, float, float], elsewhere: tuple[float, float, float]
     ) -> np.ndarray:
-        """Colours (hits, 3), or one for all, where something is hit, and one colour elsewhere: (rows, width, 3)."""
+        """Colours (hits, 3), or one for all, where something is hit, and one colour elsewhere: (pixels, 3)."""
         picture = np.empty((*self.hit.shape, 3))
         picture[...] = elsewhere
         picture[self.hit] = colours
         return picture
 
 
+LIGHT_RANGE = 333  # a power of two: a light farther away than this, in units, is brought nearer, on the same line
+
+
+def light_from_eye(light: Light, camera: Camera, unit: int) -> np.ndarray:
+    """Where a light is as seen from the eye, in units of 2**unit: (3,)."""
+    return np.ldexp(light.position, -unit) - np.ldexp(camera.eye, -unit)
+
+
 @dataclass(frozen=True)
 class Whole:
-    """The hits of the whole picture."""
+    """What is known of the whole picture."""
 
-    hits: Hits
+    hits: Hits | None
+    tests: np.ndarray | None = None  # int32 (height, width), how many spheres each pixel is tested against
 
     @cached_property
     def range(self) -> tuple[float, float]:
         """The smallest and the largest t of all hits."""
+        assert self.hits is not None
         t = self.hits.t[self.hits.index >= 0]
         return (float(t.min()), float(t.max())) if t.size else (1.0, 1.0)
 
 
 def hit(block: Block) -> np.ndarray:
     """One dummy colour wherever anything is hit."""
-    return block.paint(DUMMY, elsewhere=block.scene.background)
+    return block.paint(*dummy_and_background(block.scene))
+
+
+def dummy_and_background(scene: Scene) -> tuple[Colour, Colour]:
+    return DUMMY, scene.background
 
 
 def outline(block: Block) -> np.ndarray:
     """Black wherever anything is hit; a background that is too dark for that to be seen gives way to white."""
-    dark = max(block.scene.background) <= _TOO_DARK
-    return block.paint(BLACK, elsewhere=WHITE if dark else block.scene.background)
+    return block.paint(*black_and_background(block.scene))
+
+
+def black_and_background(scene: Scene) -> tuple[Colour, Colour]:
+    return BLACK, WHITE if max(scene.background) <= _TOO_DARK else scene.background
 
 
 def diffuse(block: Block) -> np.ndarray:
     """C = Σ over lights of diffuse · light · max(0, N·L)"""
-    colours = np.zeros_like(block.diffuse)
+    total = np.zeros_like(block.diffuse)
     for light in block.lights:
-        cosine = np.maximum(0.0, _dot(block.normals, block.to_light(light)))
-        colours += block.diffuse * light.colour * cosine[:, None]
-    return block.paint(colours, elsewhere=block.scene.background)
+        total += np.multiply.outer(block.cosine(light), light.colour)
+    return block.paint(total * block.diffuse, elsewhere=block.scene.background)
 
 
 def normal(block: Block) -> np.ndarray:
@@ -134,6 +194,8 @@ def depth(block: Block) -> np.ndarray:
 def edges(block: Block) -> np.ndarray:
     """A pixel is on an edge when the pixel right of it or the one below shows another shape."""
     assert block.whole is not None
+    assert block.whole.hits is not None
+    assert isinstance(block.rows, slice)
     index = block.whole.hits.index[block.rows.start : block.rows.stop + 1]
     edge = np.zeros(index.shape, bool)
     edge[:, :-1] |= index[:, 1:] != index[:, :-1]
@@ -148,7 +210,7 @@ def error(block: Block) -> np.ndarray:
     hit, truly_hit = found.index >= 0, true.index >= 0
     with np.errstate(all="ignore"):
         ulps = np.abs(found.t - true.t) / np.spacing(true.t)
-    picture = _on_scale(np.where(hit & truly_hit & np.isfinite(ulps), ulps, 0.0))
+    picture = _on_scale(np.where(hit & truly_hit & np.isfinite(ulps), ulps, 0.0), ULPS)
     picture[~hit & ~truly_hit] = NOTHING
     picture[hit & truly_hit & (found.index != true.index)] = WRONG_SHAPE
     picture[hit & ~truly_hit] = FALSE_HIT
@@ -156,16 +218,21 @@ def error(block: Block) -> np.ndarray:
     return picture
 
 
-def _on_scale(ulps: np.ndarray) -> np.ndarray:
-    """Colours for errors, from ULPS."""
-    bits = np.log2(np.maximum(ulps, 0.5))
-    stops = np.log2([max(ulp, 0.5) for ulp, _ in ULPS])
-    return np.stack([np.interp(bits, stops, [colour[k] for _, colour in ULPS]) for k in range(3)], axis=-1)
+def cost(block: Block) -> np.ndarray:
+    """How many spheres each pixel is tested against: those in whose boxes it lies."""
+    assert block.tests is not None
+    return _on_scale(block.tests, TESTS)
+
+
+def _on_scale(values: np.ndarray, scale: Scale) -> np.ndarray:
+    """Colours for numbers, logarithmic between those of the scale."""
+    logarithms, stops = (np.log2(np.maximum(x, 0.5)) for x in (values, [stop for stop, _ in scale]))
+    return np.stack([np.interp(logarithms, stops, [colour[k] for _, colour in scale]) for k in range(3)], axis=-1)
 
 
 NOTHING = (0.13, 0.13, 0.15)
 WRONG_SHAPE, FALSE_HIT, FALSE_MISS = (1.0, 0.0, 0.0), (1.0, 0.0, 1.0), (1.0, 0.55, 0.0)
-ULPS = (
+ULPS: Scale = (
     (0.0, (0.0, 0.12, 0.25)),
     (1.0, (0.0, 0.25, 0.5)),
     (2.0**10, (0.1, 0.6, 0.55)),
@@ -183,6 +250,27 @@ ERROR_LEGEND = (
     ),
     (NOTHING, "nothing there, rightly"),
 )
+TESTS: Scale = (
+    (0, (0.0, 0.0, 0.0)),
+    (1, (0.15, 0.1, 0.4)),
+    (4, (0.5, 0.1, 0.5)),
+    (16, (0.85, 0.25, 0.3)),
+    (64, (1.0, 0.6, 0.15)),
+    (256, (1.0, 1.0, 0.7)),
+)
+TESTS_LEGEND = (
+    (TESTS[0][1], "no test"),
+    *((colour, f"{tests} test{'' if tests == 1 else 's'}") for tests, colour in TESTS[1:-1]),
+    (TESTS[-1][1], f"{TESTS[-1][0]} tests or more"),
+)
+
+
+def background(scene: Scene) -> tuple[Colour, Colour]:
+    return BLACK, scene.background
+
+
+def black(scene: Scene) -> tuple[Colour, Colour]:
+    return BLACK, BLACK
 
 
 @dataclass(frozen=True)
@@ -192,24 +280,43 @@ class Stage:
     key: str  # in the window
     colours: Callable[[Block], np.ndarray]
     about: str
+    needs_hits: bool = True
     needs_normals: bool = False
     needs_lights: bool = False
     needs_whole: bool = False  # looks at the hits of other rows than its own
     needs_truth: bool = False  # compares the method's hits with the true ones
+    needs_tests: bool = False  # counts how many spheres a pixel is tested against
     legend: tuple[tuple[tuple[float, float, float], str], ...] = ()  # what its colours mean
+    painter: str = ""  # a kernel that paints the same bytes, for a stage that has one
+    flat: Callable[[Scene], tuple[Colour, Colour]] = background  # what it paints: the one colour of hits, the rest
 
 
 STAGES = {
-    "hit": Stage("h", hit, "a dummy colour wherever anything is hit"),
-    "outline": Stage("o", outline, "black wherever anything is hit, to check the outlines"),
-    "diffuse": Stage("d", diffuse, "the light that a matt surface throws back", needs_normals=True, needs_lights=True),
-    "normal": Stage("n", normal, "the normal (x, y, z) as red, green, blue: −1 is 0, 1 is full", needs_normals=True),
+    "hit": Stage(
+        "h", hit, "a dummy colour wherever anything is hit", painter="paint_flat", flat=dummy_and_background
+    ),
+    "outline": Stage(
+        "o", outline, "black wherever anything is hit, to check the outlines", painter="paint_flat",
+        flat=black_and_background,
+    ),
+    "diffuse": Stage(
+        "d", diffuse, "the light that a matt surface throws back", needs_normals=True, needs_lights=True,
+        painter="paint_diffuse",
+    ),
+    "normal": Stage(
+        "n", normal, "the normal (x, y, z) as red, green, blue: −1 is 0, 1 is full", needs_normals=True,
+        painter="paint_normal", flat=black,
+    ),
     "depth": Stage("z", depth, "near is white, far is grey, nothing is black", needs_whole=True),
     "edges": Stage("e", edges, "the borders between different shapes", needs_whole=True),
+    "cost": Stage(
+        "k", cost, "how many spheres each pixel is tested against", needs_hits=False, needs_tests=True,
+        legend=TESTS_LEGEND,
+    ),
     "error": Stage(
         "x", error, "where the method is wrong, against exact arithmetic", needs_truth=True, legend=ERROR_LEGEND
     ),
-}
+}  # fmt: skip
 
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
+
+from raytracer.scene import Spheres
 
 _TOO_SMALL, _TOO_LARGE = 1e-50, 1e50
 
@@ -13,11 +17,28 @@ def in_units(*lengths: np.ndarray) -> tuple[int, list[np.ndarray]]:
     The lengths stay as they are, e = 0, if some of them would lose digits.
     """
     largest = max((float(np.abs(array).max(initial=0.0)) for array in lengths), default=0.0)
-    if largest == 0.0 or _TOO_SMALL < largest < _TOO_LARGE:
-        return 0, list(lengths)
+    return (0, list(lengths)) if _is_usual(largest) else _scaled(largest, *lengths)
+
+
+def sphere_units(eye: Sequence[float], spheres: Spheres) -> tuple[int, np.ndarray, np.ndarray]:
+    """`in_units` for an eye (3,) and spheres: e, the eye, and the spheres' `balls`."""
+    origin, largest = np.array(eye), max(spheres.largest, *map(abs, eye))
+    if _is_usual(largest):
+        return 0, origin, spheres.balls
+    unit, (origin, balls) = _scaled(largest, origin, spheres.balls)
+    balls.flags.writeable = False  # to the kernels, arrays that can be written to are others
+    return unit, origin, balls
+
+
+def _is_usual(largest: float) -> bool:
+    return largest == 0.0 or _TOO_SMALL < largest < _TOO_LARGE
+
+
+def _scaled(largest: float, *lengths: np.ndarray) -> tuple[int, list[np.ndarray]]:
     exponent = int(np.frexp(largest)[1])
     scaled = [np.ldexp(array, -exponent) for array in lengths]
-    if any((np.ldexp(array, exponent) != length).any() for array, length in zip(scaled, lengths, strict=True)):
+    back = (np.ldexp(array, exponent) for array in scaled)
+    if not all(np.array_equal(array, length, equal_nan=True) for array, length in zip(back, lengths, strict=True)):
         return 0, list(lengths)
     return exponent, scaled
 

@@ -7,7 +7,7 @@ from types import ModuleType
 import numpy as np
 
 from raytracer.arrays import Balls, Hits, UsualRays
-from raytracer.camera import Raster, directions, eye_grid, twofold_eye_rays
+from raytracer.camera import Raster, directions, eye_grid, rows_of, twofold_eye_rays
 from raytracer.methods import METHODS
 
 
@@ -41,7 +41,7 @@ def usual_given(
 
 
 def _eye_rays(method: str, raster: Raster, rows: slice) -> UsualRays:
-    grid = eye_grid(raster, rows)
+    grid = rows_of(eye_grid(raster), rows)
     if not METHODS[method].twofold:
         precision = METHODS[method].precision
         u, v, back = (tuple(np.array(vector, precision)) for vector in (grid.u, grid.v, grid.back))

@@ -23,11 +23,14 @@ from types import FunctionType, ModuleType
 import numba
 from numba.extending import overload, register_jitable
 
-from raytracer import certified, methods, twofold
+from raytracer import boxes, certified, methods, shading, twofold
+from raytracer.kernels.lanes import Mask, blend
 
 
 @overload(twofold.select)
 def _select(condition, yes, no):
+    if isinstance(condition, Mask):
+        return lambda condition, yes, no: blend(condition, yes, no)
     return lambda condition, yes, no: yes if condition else no
 
 
@@ -49,7 +52,7 @@ def _compile_calls_into(module: ModuleType) -> None:
             register_jitable(function)
 
 
-_SOURCES = (twofold, certified, methods)
+_SOURCES = (twofold, certified, boxes, shading, methods)
 _OVERLOADED = (twofold.select, twofold.exponent, twofold.scale)
 for _module in _SOURCES:
     _compile_calls_into(_module)
@@ -78,6 +81,12 @@ def _can_write(folder: Path) -> bool:
 
 _CACHE = _cache_folder()
 compiled = partial(numba.njit, cache=_CACHE is not None, nogil=True, error_model="numpy")
+
+# For kernels that make no arrays: without counting who still uses those that they are given.
+borrowing = partial(compiled, _nrt=False)
+
+# For parts of kernels: a call would hand over each array of its arguments in seven pieces.
+inlined = partial(borrowing, forceinline=True)
 
 
 @contextmanager

@@ -2,162 +2,47 @@
 
 import numpy as np
 
-from raytracer.arrays import Seen
-from raytracer.certified import (
-    K_ERROR,
-    T_TOLERANCE,
-    U,
-    approach,
-    arrive,
-    contends,
-    distance,
-    look,
-    look_twofold,
-    meet,
-    meet_twofold,
-    nearer,
-    passes,
-    rim_of,
-)
+from raytracer.certified import T_TOLERANCE, contends, inner, look, look_twofold, meet, meet_twofold, nearer, passes
 from raytracer.kernels.compiler import compiled
 
 
 @compiled
-def see(origin, centres, radii):
-    """`plain.see`."""
-    n = len(radii)
-    x, y, z, c, c_error, size = np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(n)
-    rim = np.empty(n)
-    ox, oy, oz = origin[0], origin[1], origin[2]
-    for i in range(n):
-        cx, cy, cz = centres[i, 0], centres[i, 1], centres[i, 2]
-        x[i], y[i], z[i], _, _, _, c[i], _, error, size[i] = look_twofold(
-            ox, oy, oz, cx, cy, cz, radii[i], np.nan, 0.0, 0.0
-        )
-        c_error[i] = U * abs(c[i]) + error
-        rim[i] = rim_of(c[i], size[i])
-    return Seen(x, y, z, c, c_error, size, radii, rim)
-
-
-@compiled
-def first_of_grid(grid, seen, boxes, first_row, kappa, first):
-    """`plain.first_of_grid`.
-
-    The arrays of the picture are walked through flat, and counted by unsigned numbers: with a sign, an index might be
-    meant from the end, and the check for that keeps the inner loops from being vectorised.
-    """
-    k, index, unsure = first.k.reshape(-1), first.index.reshape(-1), first.unsure.reshape(-1)
-    width = np.uint64(len(grid.across))
-    for i in range(len(boxes)):
-        left, right = np.uint64(boxes[i, 0]), np.uint64(boxes[i, 1])
-        for y in range(max(boxes[i, 2] - first_row, 0), min(boxes[i, 3] - first_row, len(grid.up))):
-            start = np.uint64(y) * width
-            if seen.rim[i] * kappa > 0.0:
-                _approach_row(grid, y, seen, i, seen.rim[i] * kappa, left, right, start, k, index, unsure)
-            else:
-                _meet_row(grid, y, seen, i, left, right, start, k, index, unsure)
-
-
-@compiled
-def distances(grid, seen, first):
-    """`plain.distances`."""
-    t = np.full(first.index.shape, np.inf)
-    ux, uy, uz = grid.u
-    bx, by, bz = grid.back
-    for y in range(len(grid.up)):
-        vx, vy, vz = grid.up[y] * grid.v[0], grid.up[y] * grid.v[1], grid.up[y] * grid.v[2]
-        for x in range(len(grid.across)):
-            i = first.index[y, x]
-            if i >= 0:
-                s = grid.across[x]
-                dx, dy, dz = s * ux + vx - bx, s * uy + vy - by, s * uz + vz - bz
-                h = dx * seen.x[i] + dy * seen.y[i] + dz * seen.z[i]
-                a = dx * dx + dy * dy + dz * dz
-                t[y, x] = distance(h, a, seen.c[i], np.sqrt(abs(h * h - a * seen.c[i])))
-    return t
-
-
-@compiled
-def _approach_row(grid, y, seen, i, rim, left, right, start, k, index, unsure):
-    """One quick sphere against the pixels from left to right of row y."""
-    across = grid.across
-    ux, uy, uz = grid.u
-    vx, vy, vz = grid.up[y] * grid.v[0], grid.up[y] * grid.v[1], grid.up[y] * grid.v[2]
-    bx, by, bz = grid.back
-    lx, ly, lz, c, ml = seen.x[i], seen.y[i], seen.z[i], seen.c[i], grid.reach[y] * seen.size[i]
-    for x in range(left, right):
-        dx, dy, dz = across[x] * ux + vx - bx, across[x] * uy + vy - by, across[x] * uz + vz - bz
-        h = dx * lx + dy * ly + dz * lz
-        p = start + x
-        found, wins, open_ = approach(h, dx * dx + dy * dy + dz * dz, c, ml, rim, k[p])
-        k[p] = found if wins else k[p]
-        index[p] = i if wins else index[p]
-        unsure[p] = unsure[p] | open_
-
-
-@compiled
-def _meet_row(grid, y, seen, i, left, right, start, k, index, unsure):
-    """Any sphere against the pixels from left to right of row y."""
-    across = grid.across
-    ux, uy, uz = grid.u
-    vx, vy, vz = grid.up[y] * grid.v[0], grid.up[y] * grid.v[1], grid.up[y] * grid.v[2]
-    bx, by, bz = grid.back
-    lx, ly, lz, c, c_error, size = seen.x[i], seen.y[i], seen.z[i], seen.c[i], seen.c_error[i], seen.size[i]
-    radius, m = seen.radius[i], grid.reach[y]
-    for x in range(left, right):
-        dx, dy, dz = across[x] * ux + vx - bx, across[x] * uy + vy - by, across[x] * uz + vz - bz
-        a = dx * dx + dy * dy + dz * dz
-        p = start + x
-        t, _, low = meet(lx, ly, lz, c, c_error, size, radius, dx, dy, dz, a, m, K_ERROR / 2)
-        found, wins, open_ = arrive(t, low, a, k[p])
-        k[p] = found if wins else k[p]
-        index[p] = i if wins else index[p]
-        unsure[p] = unsure[p] | open_
-
-
-@compiled
-def nearest_given(origins, rays, centres, radii, nearest):
+def nearest_given(origins, rays, balls, nearest):
     """`plain.nearest_given`."""
     best, best_error, best_index, unsure = nearest
     for k in range(len(origins)):
         ox, oy, oz = origins[k, 0], origins[k, 1], origins[k, 2]
-        for i in range(len(radii)):
-            cx, cy, cz = centres[i, 0], centres[i, 1], centres[i, 2]
-            lx, ly, lz, c, c_error, size = look(ox, oy, oz, cx, cy, cz, radii[i])
-            h = rays.x[k] * lx + rays.y[k] * ly + rays.z[k] * lz
-            if passes(h, rays.square[k], c, c_error, rays.reach[k] * size, rays.reach[k]):
+        for i in range(len(balls)):
+            lx, ly, lz, c, c_error, size = look(ox, oy, oz, balls[i, 0], balls[i, 1], balls[i, 2], balls[i, 3])
+            h = inner(rays.x[k], rays.y[k], rays.z[k], lx, ly, lz)
+            a, m = rays.square[k], rays.reach[k]
+            if passes(h, a, c, c_error, m * size, m):
                 continue
-            t, error, low = meet(
-                lx, ly, lz, c, c_error, size, radii[i],
-                rays.x[k], rays.y[k], rays.z[k], rays.square[k], rays.reach[k], T_TOLERANCE,
-            )  # fmt: skip
+            t, error, low = meet(h, a, c, c_error, size, balls[i, 3], m, T_TOLERANCE)
             best[k], _, best_error[k], best_index[k], unsure[k] = nearer(
                 best[k], 0.0, best_error[k], best_index[k], unsure[k], t, 0.0, error, low, i
             )
 
 
 @compiled
-def nearest_twofold(origins, rays, boxed, centres, radii, sides, nearest):
+def nearest_twofold(origins, rays, candidates, balls, sides, nearest):
     """`plain.nearest_twofold`."""
     best, best_error, best_index, unsure = nearest
     for k in range(len(origins)):
         ox, oy, oz = origins[k, 0], origins[k, 1], origins[k, 2]
         dx, dy, dz, m = rays.x[k], rays.y[k], rays.z[k], rays.reach[k]
         dx_low, dy_low, dz_low = rays.x_low[k], rays.y_low[k], rays.z_low[k]
-        square = dx * dx + dy * dy + dz * dz
-        t_low = 0.0
-        i = -1
-        while True:
-            i = _next_box(boxed.boxes, boxed.x[k], boxed.y[k], i + 1)
-            if i == len(radii):
-                break
-            cx, cy, cz = centres[i, 0], centres[i, 1], centres[i, 2]
-            lx, ly, lz, c, c_error, size = look(ox, oy, oz, cx, cy, cz, radii[i])
-            t, error, low = meet(lx, ly, lz, c, c_error, size, radii[i], dx, dy, dz, square, m, T_TOLERANCE)
-            if not contends(t, error, low, best[k], best_error[k]) or _equal(centres, radii, best_index[k], i):
+        square, t_low = inner(dx, dy, dz, dx, dy, dz), 0.0
+        for place in range(candidates.starts[k], candidates.starts[k + 1]):
+            i = candidates.ids[place]
+            cx, cy, cz, radius = balls[i, 0], balls[i, 1], balls[i, 2], balls[i, 3]
+            lx, ly, lz, c, c_error, size = look(ox, oy, oz, cx, cy, cz, radius)
+            t, error, low = meet(inner(dx, dy, dz, lx, ly, lz), square, c, c_error, size, radius, m, T_TOLERANCE)
+            if not contends(t, error, low, best[k], best_error[k]) or _equal(balls, best_index[k], i):
                 continue
+            known, known_low, known_error = _known_side(sides, i)
             lx, ly, lz, lx_low, ly_low, lz_low, c, c_low, c_error, size = look_twofold(
-                ox, oy, oz, cx, cy, cz, radii[i], sides.c[i], sides.c_low[i], sides.c_error[i]
+                ox, oy, oz, cx, cy, cz, radius, known, known_low, known_error
             )
             t, rest, error, low = meet_twofold(
                 lx, ly, lz, lx_low, ly_low, lz_low, c, c_low, c_error, size, dx, dy, dz, dx_low, dy_low, dz_low, m
@@ -168,22 +53,14 @@ def nearest_twofold(origins, rays, boxed, centres, radii, sides, nearest):
 
 
 @compiled
-def polish(origins, rays, centres, radii, sides):
+def polish(origins, rays, balls, known):
     """`plain.polish`."""
-    found = np.empty(len(radii))
-    for k in range(len(radii)):
+    found = np.empty(len(balls))
+    for k in range(len(balls)):
         lx, ly, lz, lx_low, ly_low, lz_low, c, c_low, c_error, size = look_twofold(
-            origins[k, 0],
-            origins[k, 1],
-            origins[k, 2],
-            centres[k, 0],
-            centres[k, 1],
-            centres[k, 2],
-            radii[k],
-            sides.c[k],
-            sides.c_low[k],
-            sides.c_error[k],
-        )
+            origins[k, 0], origins[k, 1], origins[k, 2], balls[k, 0], balls[k, 1], balls[k, 2], balls[k, 3],
+            known[0][k], known[1][k], known[2][k],
+        )  # fmt: skip
         found[k], _, _, _ = meet_twofold(
             lx, ly, lz, lx_low, ly_low, lz_low, c, c_low, c_error, size,
             rays.x[k], rays.y[k], rays.z[k], rays.x_low[k], rays.y_low[k], rays.z_low[k], rays.reach[k],
@@ -192,17 +69,16 @@ def polish(origins, rays, centres, radii, sides):
 
 
 @compiled
-def _next_box(boxes, x, y, i):
-    """The first box from number i on in which the pixel lies, or the number of boxes."""
-    while i < len(boxes):
-        if boxes[i, 0] <= x and x < boxes[i, 1] and boxes[i, 2] <= y and y < boxes[i, 3]:
-            return i
-        i += 1
-    return i
+def _known_side(sides, i):
+    """`plain.known_sides` for one sphere."""
+    k = np.searchsorted(sides.which, i)
+    if k < len(sides.which) and sides.which[k] == i:
+        return sides.c[k], sides.c_low[k], sides.c_error[k]
+    return np.nan, 0.0, 0.0
 
 
 @compiled
-def _equal(centres, radii, j, i):
-    if j < 0 or radii[j] != radii[i]:
+def _equal(balls, j, i):
+    if j < 0 or balls[j, 3] != balls[i, 3]:
         return False
-    return centres[j, 0] == centres[i, 0] and centres[j, 1] == centres[i, 1] and centres[j, 2] == centres[i, 2]
+    return balls[j, 0] == balls[i, 0] and balls[j, 1] == balls[i, 1] and balls[j, 2] == balls[i, 2]

@@ -1,0 +1,364 @@
+"""Eight numbers as one value: what a processor computes at once.
+
+A kernel that is written with lanes in place of numbers runs for eight pixels, spheres or rays in one go, on whatever
+vectors the processor has. The compiler vectorises plain loops too, but not those with a branch, a slice or many arrays,
+and it does not say when it gives up. The formulas of `certified`, plain arithmetic, take lanes as they take numbers.
+
+    Lanes    <8 x double>   + − × ÷, −x, abs, sqrt, floor, ceil, comparisons; a number beside lanes counts eight times
+    Mask     <8 x i1>       & | ~; any_of, bits_of; `select(mask, lanes, lanes)`
+    Places   <8 x i32>      eight int32
+
+Arrays are one-dimensional and contiguous; nothing checks their ends.
+"""
+
+import operator
+
+import numpy as np
+from llvmlite import ir
+from numba.core import types
+from numba.core.cgutils import get_or_insert_function
+from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+from numba.extending import intrinsic, lower_builtin, lower_cast, models, register_model
+
+WIDTH = 8
+
+_DOUBLE, _INT32, _BYTE, _BIT = ir.DoubleType(), ir.IntType(32), ir.IntType(8), ir.IntType(1)
+_FOUR = 4  # numbers of a row of a table
+
+
+class Lanes(types.Type):
+    element = _DOUBLE
+
+
+class Mask(types.Type):
+    element = _BIT
+
+
+class Places(types.Type):
+    element = _INT32
+
+
+LANES, MASK, PLACES = Lanes("lanes"), Mask("mask"), Places("places")
+
+
+@register_model(Lanes)
+@register_model(Mask)
+@register_model(Places)
+class _Vector(models.PrimitiveModel):
+    def __init__(self, manager, kind):
+        super().__init__(manager, kind, ir.VectorType(kind.element, WIDTH))
+
+
+@lower_cast(types.Number, Lanes)
+def _eight_numbers(context, builder, number, lanes, value):
+    return _spread(builder, context.cast(builder, value, number, types.float64))
+
+
+@lower_cast(types.Boolean, Mask)
+def _eight_bits(context, builder, boolean, mask, value):
+    return _spread(builder, value)
+
+
+def _spread(builder, value):
+    vector = ir.VectorType(value.type, WIDTH)
+    first = builder.insert_element(ir.Constant(vector, ir.Undefined), value, ir.Constant(_INT32, 0))
+    return builder.shuffle_vector(first, first, _order([0] * WIDTH))
+
+
+def _order(numbers):
+    return ir.Constant(ir.VectorType(_INT32, len(numbers)), list(numbers))
+
+
+# ---------------------------------------------------------------------------------------------------- operators
+
+
+def _operator(symbol, operand, result, count, lower):
+    """Let a symbol take so many operands, of which one at least is a vector and the rest may be single values."""
+    vector, single = type(operand), types.Boolean if operand is MASK else types.Number
+
+    @infer_global(symbol)
+    class Operator(AbstractTemplate):
+        def generic(self, args, kws):
+            fits = len(args) == count and all(isinstance(arg, (vector, single)) for arg in args)
+            some = any(isinstance(arg, vector) for arg in args)
+            return signature(result, *[operand] * count) if fits and some else None
+
+    lower_builtin(symbol, *[vector] * count)(lambda context, builder, sig, args: lower(builder, *args))
+
+
+def _instruction(name):
+    """The call of an LLVM intrinsic whose operands and result are lanes."""
+
+    def lower(builder, *args):
+        kind = ir.FunctionType(args[0].type, [arg.type for arg in args])
+        return builder.call(get_or_insert_function(builder.module, kind, f"{name}.v{WIDTH}f64"), args)
+
+    return lower
+
+
+def _comparison(sign):
+    return lambda builder, a, b: builder.fcmp_ordered(sign, a, b)
+
+
+for _symbol, _lower in (
+    (operator.add, ir.IRBuilder.fadd),
+    (operator.sub, ir.IRBuilder.fsub),
+    (operator.mul, ir.IRBuilder.fmul),
+    (operator.truediv, ir.IRBuilder.fdiv),
+):
+    _operator(_symbol, LANES, LANES, 2, _lower)
+for _symbol, _lower in (
+    (operator.neg, ir.IRBuilder.fneg),
+    (abs, _instruction("llvm.fabs")),
+    (np.sqrt, _instruction("llvm.sqrt")),
+    (np.floor, _instruction("llvm.floor")),
+    (np.ceil, _instruction("llvm.ceil")),
+):
+    _operator(_symbol, LANES, LANES, 1, _lower)
+for _symbol, _sign in (
+    (operator.lt, "<"),
+    (operator.le, "<="),
+    (operator.gt, ">"),
+    (operator.ge, ">="),
+    (operator.eq, "=="),
+):
+    _operator(_symbol, LANES, MASK, 2, _comparison(_sign))
+_operator(operator.and_, MASK, MASK, 2, ir.IRBuilder.and_)
+_operator(operator.or_, MASK, MASK, 2, ir.IRBuilder.or_)
+_operator(operator.invert, MASK, MASK, 1, ir.IRBuilder.not_)
+
+
+@intrinsic
+def blend(typing, mask, yes, no):
+    """In each lane `yes` or `no`, of which one may be a number."""
+    kind = next((arg for arg in (yes, no) if isinstance(arg, (Lanes, Mask, Places))), LANES)
+    return kind(mask, kind, kind), lambda context, builder, sig, args: builder.select(*args)
+
+
+@intrinsic
+def spread(typing, number):
+    """The same number in all lanes."""
+    kind = PLACES if isinstance(number, types.Integer) else LANES
+    scalar = types.int32 if kind is PLACES else types.float64
+
+    def lower(context, builder, sig, args):
+        return _spread(builder, args[0])
+
+    return kind(scalar), lower
+
+
+@intrinsic
+def any_of(typing, mask):
+    """Whether any lane is true."""
+
+    def lower(context, builder, sig, args):
+        return builder.icmp_unsigned("!=", builder.bitcast(args[0], _BYTE), ir.Constant(_BYTE, 0))
+
+    return types.boolean(mask), lower
+
+
+@intrinsic
+def bits_of(typing, mask):
+    """A byte whose bit i is lane i."""
+
+    def lower(context, builder, sig, args):
+        return builder.bitcast(args[0], _BYTE)
+
+    return types.uint8(mask), lower
+
+
+@intrinsic
+def same(typing, places):
+    """Whether all lanes are equal to the first."""
+
+    def lower(context, builder, sig, args):
+        first = builder.shuffle_vector(args[0], args[0], _order([0] * WIDTH))
+        equal = builder.bitcast(builder.icmp_signed("==", args[0], first), _BYTE)
+        return builder.icmp_unsigned("==", equal, ir.Constant(_BYTE, 255))
+
+    return types.boolean(places), lower
+
+
+@intrinsic
+def first_of(typing, places):
+    """The first lane."""
+    return types.int32(places), lambda context, builder, sig, args: builder.extract_element(
+        args[0], ir.Constant(_INT32, 0)
+    )
+
+
+@intrinsic
+def largest_of(typing, places):
+    """The largest of the lanes."""
+
+    def lower(context, builder, sig, args):
+        kind = ir.FunctionType(_INT32, [args[0].type])
+        return builder.call(get_or_insert_function(builder.module, kind, f"llvm.vector.reduce.smax.v{WIDTH}i32"), args)
+
+    return types.int32(places), lower
+
+
+@intrinsic
+def is_hit(typing, places):
+    """Where a place is not negative."""
+
+    def lower(context, builder, sig, args):
+        return builder.icmp_signed(">=", args[0], ir.Constant(args[0].type, None))
+
+    return MASK(places), lower
+
+
+# ------------------------------------------------------------------------------------------------------- arrays
+
+
+def _address(context, builder, kind, array, index, vector):
+    """Where the element lies, as a pointer to a vector."""
+    start = context.make_array(kind)(context, builder, array).data
+    return builder.bitcast(builder.gep(start, [index]), vector.as_pointer())
+
+
+@intrinsic
+def load(typing, array, i):
+    """Eight numbers of an array, from element i on: lanes of float64, places of int32."""
+    kind = PLACES if array.dtype == types.int32 else LANES
+
+    def lower(context, builder, sig, args):
+        vector = ir.VectorType(kind.element, WIDTH)
+        return builder.load(_address(context, builder, sig.args[0], args[0], args[1], vector), align=4)
+
+    return kind(array, types.uint64), lower
+
+
+@intrinsic
+def store(typing, array, i, value):
+    """Put lanes or places into an array, from element i on."""
+
+    def lower(context, builder, sig, args):
+        builder.store(args[2], _address(context, builder, sig.args[0], args[0], args[1], args[2].type), align=4)
+        return context.get_dummy_value()
+
+    return types.void(array, types.uint64, value), lower
+
+
+def _joined(builder, vectors):
+    """Vectors one behind the other, as one."""
+    while len(vectors) > 1:
+        width = 2 * vectors[0].type.count
+        pairs = zip(vectors[::2], vectors[1::2], strict=True)
+        vectors = [builder.shuffle_vector(a, b, _order(range(width))) for a, b in pairs]
+    return vectors[0]
+
+
+def _columns(context, builder, wide):
+    """Four lanes: the columns of eight rows of four numbers."""
+    columns = [builder.shuffle_vector(wide, wide, _order(range(k, _FOUR * WIDTH, _FOUR))) for k in range(_FOUR)]
+    return context.make_tuple(builder, types.UniTuple(LANES, _FOUR), columns)
+
+
+@intrinsic
+def load_rows(typing, table, i):
+    """Eight rows of a flat table of four columns, from row i on, as four lanes."""
+
+    def lower(context, builder, sig, args):
+        start = builder.mul(args[1], ir.Constant(args[1].type, _FOUR))
+        wide = ir.VectorType(_DOUBLE, _FOUR * WIDTH)
+        address = _address(context, builder, sig.args[0], args[0], start, wide)
+        return _columns(context, builder, builder.load(address, align=8))
+
+    return types.UniTuple(LANES, _FOUR)(table, types.uint64), lower
+
+
+@intrinsic
+def gather_rows(typing, table, places):
+    """The rows of a flat table of four columns at eight places, as four lanes."""
+
+    def lower(context, builder, sig, args):
+        row, rows = ir.VectorType(_DOUBLE, _FOUR), []
+        for lane in range(WIDTH):
+            place = builder.zext(builder.extract_element(args[1], ir.Constant(_INT32, lane)), ir.IntType(64))
+            start = builder.mul(place, ir.Constant(place.type, _FOUR))
+            rows.append(builder.load(_address(context, builder, sig.args[0], args[0], start, row), align=8))
+        return _columns(context, builder, _joined(builder, rows))
+
+    return types.UniTuple(LANES, _FOUR)(table, places), lower
+
+
+@intrinsic
+def gather(typing, array, places):
+    """The numbers of an array at eight places."""
+    kind = PLACES if array.dtype == types.int32 else LANES
+
+    def lower(context, builder, sig, args):
+        found = ir.Constant(ir.VectorType(kind.element, WIDTH), ir.Undefined)
+        start = context.make_array(sig.args[0])(context, builder, args[0]).data
+        for lane in range(WIDTH):
+            where = ir.Constant(_INT32, lane)
+            place = builder.zext(builder.extract_element(args[1], where), ir.IntType(64))
+            found = builder.insert_element(found, builder.load(builder.gep(start, [place])), where)
+        return found
+
+    return kind(array, places), lower
+
+
+@intrinsic
+def store_boxes(typing, table, i, left, right, top, bottom):
+    """Four lanes of whole numbers as rows i to i + 7 of a flat int32 table of four columns."""
+
+    def lower(context, builder, sig, args):
+        vector = ir.VectorType(_INT32, WIDTH)
+        wide = _joined(builder, [builder.fptosi(lanes, vector) for lanes in args[2:]])
+        order = [WIDTH * column + row for row in range(WIDTH) for column in range(_FOUR)]
+        start = builder.mul(args[1], ir.Constant(args[1].type, _FOUR))
+        rows = builder.shuffle_vector(wide, wide, _order(order))
+        builder.store(rows, _address(context, builder, sig.args[0], args[0], start, rows.type), align=4)
+        return context.get_dummy_value()
+
+    return types.void(table, types.uint64, LANES, LANES, LANES, LANES), lower
+
+
+@intrinsic
+def fetch_ahead(typing, array, i):
+    """Ask the processor to bring an element of an array into its cache: it will be wanted soon."""
+
+    def lower(context, builder, sig, args):
+        start = context.make_array(sig.args[0])(context, builder, args[0]).data
+        pointer = builder.bitcast(builder.gep(start, [args[1]]), _BYTE.as_pointer())
+        kind = ir.FunctionType(ir.VoidType(), [pointer.type, _INT32, _INT32, _INT32])
+        prefetch = get_or_insert_function(builder.module, kind, "llvm.prefetch.p0")
+        builder.call(prefetch, [pointer, *(ir.Constant(_INT32, n) for n in (0, 3, 1))])
+        return context.get_dummy_value()
+
+    return types.void(array, types.uint64), lower
+
+
+# ------------------------------------------------------------------------------------------------------- pixels
+
+
+@intrinsic
+def put_pixels(typing, picture, start, step, red, green, blue):
+    """Eight pixels as bytes, from byte `start` of a flat picture on; a pixel takes `step` bytes, 3 or 4.
+
+    The lanes are from 0 to 255 already, and cut off to whole numbers. The fourth byte stays what it is.
+    """
+
+    def lower(context, builder, sig, args):
+        picture, start, step, *colours = args
+        bytes_ = [builder.fptoui(lanes, ir.VectorType(_INT32, WIDTH)) for lanes in colours]
+        red, green, blue = (builder.trunc(lanes, ir.VectorType(_BYTE, WIDTH)) for lanes in bytes_)
+        wide = _joined(builder, [red, green, blue, blue])
+        with builder.if_else(builder.icmp_unsigned("==", step, ir.Constant(step.type, 3))) as (three, four):
+            with three:
+                order = _order([WIDTH * colour + pixel for pixel in range(WIDTH) for colour in range(3)])
+                pixels = builder.shuffle_vector(wide, wide, order)
+                builder.store(
+                    pixels, _address(context, builder, sig.args[0], picture, start, pixels.type), align=1
+                )
+            with four:
+                order = _order([WIDTH * colour + pixel for pixel in range(WIDTH) for colour in range(4)])
+                pixels = builder.shuffle_vector(wide, wide, order)
+                address = _address(context, builder, sig.args[0], picture, start, pixels.type)
+                keep = ir.Constant(ir.VectorType(_BIT, 4 * WIDTH), [True, True, True, False] * WIDTH)
+                builder.store(builder.select(keep, pixels, builder.load(address, align=1)), address, align=1)
+        return context.get_dummy_value()
+
+    return types.void(picture, types.uint64, types.uint64, LANES, LANES, LANES), lower

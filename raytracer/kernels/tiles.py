@@ -1,0 +1,220 @@
+"""Tiles to pixels: what a tile's depth buffer holds becomes colours, or hits, or nothing but a background.
+
+    boxes, lists ─ see_tile ─> k, index ─ a painter ─> bytes of a picture, or t and index of hits
+
+A painter does one tile, a row at a time, eight pixels at a time. Doubtful pixels are listed, and painted all the same:
+whoever called decides them and paints them anew.
+"""
+
+import numpy as np
+
+from raytracer.arrays import Tile
+from raytracer.kernels.bounds import TILE_HEIGHT, TILE_WIDTH
+from raytracer.kernels.compiler import borrowing, inlined
+from raytracer.kernels.lanes import (
+    WIDTH,
+    any_of,
+    first_of,
+    gather,
+    gather_rows,
+    is_hit,
+    largest_of,
+    load,
+    put_pixels,
+    same,
+    spread,
+    store,
+)
+from raytracer.kernels.visibility import STRIDE, list_doubts, see_tile
+from raytracer.shading import cosine, to_byte, towards
+from raytracer.twofold import select
+
+
+def _build(paint_tile, fill_tile):
+    """The loop over tiles for a painter, and for one of tiles that hit nothing."""
+
+    @borrowing
+    def paint(view, slow, bins, first, last, scratch, doubts, paints, out):
+        """Paint tiles from first on, before last; returns the first that was not painted for want of room for doubts."""
+        for number in range(first, last):
+            if len(doubts) - doubts[0] <= TILE_WIDTH * TILE_HEIGHT:
+                return number
+            tile = _tile(view, bins, number)
+            if len(slow.ids) == 0 and bins.starts[number] == bins.starts[number + 1]:
+                fill_tile(scratch, tile, paints, out)
+                continue
+            if see_tile(view, slow, bins, tile, scratch):
+                list_doubts(view, tile, scratch, doubts)
+            paint_tile(view, scratch, tile, paints, out)
+        return last
+
+    return paint
+
+
+@inlined
+def _tile(view, bins, number):
+    left, top = number % bins.columns * TILE_WIDTH, number // bins.columns * TILE_HEIGHT
+    width, height = len(view.across) - WIDTH, len(view.up)
+    return Tile(number, left, top, min(left + TILE_WIDTH, width), min(top + TILE_HEIGHT, height))
+
+
+@inlined
+def _put(out, row, x, right, red, green, blue, scratch):
+    """Eight pixels from x on, or as many as there are before `right`."""
+    start = np.uint64(row * out.row_bytes + x * out.pixel_bytes)
+    if x + WIDTH <= right and x + WIDTH <= out.columns:
+        put_pixels(out.bytes, start, np.uint64(out.pixel_bytes), red, green, blue)
+    else:
+        put_pixels(scratch.rest, np.uint64(0), np.uint64(3), red, green, blue)
+        for pixel in range(right - x):
+            for colour in range(3):
+                out.bytes[start + np.uint64(pixel * out.pixel_bytes + colour)] = scratch.rest[3 * pixel + colour]
+
+
+@inlined
+def _put_background(out, row, x, right, paints, scratch):
+    red, green, blue = paints.background[0], paints.background[1], paints.background[2]
+    _put(out, row, x, right, spread(red), spread(green), spread(blue), scratch)
+
+
+@borrowing
+def _fill_tile(scratch, tile, paints, out):
+    """The background."""
+    for row in range(tile.top, tile.bottom):
+        for x in range(tile.left, tile.right, WIDTH):
+            _put_background(out, row, x, tile.right, paints, scratch)
+
+
+@borrowing
+def _flat_tile(view, scratch, tile, paints, out):
+    """One colour wherever anything is hit."""
+    for row in range(tile.top, tile.bottom):
+        for x in range(tile.left, tile.right, WIDTH):
+            hit = is_hit(load(scratch.index, _place(tile, row, x)))
+            red, green, blue = _over(paints, hit, paints.flat[0], paints.flat[1], paints.flat[2])
+            _put(out, row, x, tile.right, red, green, blue, scratch)
+
+
+@borrowing
+def _diffuse_tile(view, scratch, tile, paints, out):
+    """`stages.diffuse`."""
+    for row in range(tile.top, tile.bottom):
+        line = _line(view, row)
+        for x in range(tile.left, tile.right, WIDTH):
+            place = _place(tile, row, x)
+            index = load(scratch.index, place)
+            hit = is_hit(index)
+            if not any_of(hit):
+                _put_background(out, row, x, tile.right, paints, scratch)
+                continue
+            where = select(hit, index, spread(largest_of(index)))
+            p, n, radius = _surface(view, line, load(scratch.k, place), x, where)
+            red, green, blue, light = spread(0.0), spread(0.0), spread(0.0), paints.lights
+            for i in range(np.uint64(len(light))):
+                facing, square = towards(p, n, (light[i, 0], light[i, 1], light[i, 2]))
+                shine = cosine(facing, square, radius)
+                red, green, blue = red + light[i, 3] * shine, green + light[i, 4] * shine, blue + light[i, 5] * shine
+            r, g, b, _ = _colours(paints, where)
+            red, green, blue = _over(paints, hit, to_byte(red * r), to_byte(green * g), to_byte(blue * b))
+            _put(out, row, x, tile.right, red, green, blue, scratch)
+
+
+@borrowing
+def _normal_tile(view, scratch, tile, paints, out):
+    """`stages.normal`."""
+    for row in range(tile.top, tile.bottom):
+        line = _line(view, row)
+        for x in range(tile.left, tile.right, WIDTH):
+            place = _place(tile, row, x)
+            index = load(scratch.index, place)
+            hit = is_hit(index)
+            if not any_of(hit):
+                _put_background(out, row, x, tile.right, paints, scratch)
+                continue
+            where = select(hit, index, spread(largest_of(index)))
+            _, n, radius = _surface(view, line, load(scratch.k, place), x, where)
+            red, green, blue = (n[0] / radius + 1.0) / 2.0, (n[1] / radius + 1.0) / 2.0, (n[2] / radius + 1.0) / 2.0
+            red, green, blue = _over(paints, hit, to_byte(red), to_byte(green), to_byte(blue))
+            _put(out, row, x, tile.right, red, green, blue, scratch)
+
+
+@inlined
+def _place(tile, row, x):
+    """Where a pixel is in the depth buffer."""
+    return np.uint64((row - tile.top) * STRIDE + x - tile.left)
+
+
+@inlined
+def _line(view, row):
+    """What a row's rays share: a1 and a0 of D·D, and D but for U·u."""
+    up, v, back, r = view.up[row], view.v, view.back, np.uint64(row)
+    return view.a1[r], view.a0[r], up * v[0] - back[0], up * v[1] - back[1], up * v[2] - back[2]
+
+
+@inlined
+def _surface(view, line, k, x, where):
+    """The hit points as seen from the eye and from their spheres' centres, and the radii."""
+    across, (a1, a0, dx, dy, dz), u, eye = load(view.across, x), line, view.u, view.eye
+    t = k / ((across * view.a2 + a1) * across + a0)
+    px, py, pz = t * (across * u[0] + dx), t * (across * u[1] + dy), t * (across * u[2] + dz)
+    if same(where):
+        i, balls = 4 * np.uint64(first_of(where)), view.balls
+        one = np.uint64(1)
+        cx, cy, cz, radius = spread(balls[i]), spread(balls[i + one]), spread(balls[i + one + one]), spread(balls[i + one + one + one])
+    else:
+        cx, cy, cz, radius = gather_rows(view.balls, where)
+    return (px, py, pz), (eye[0] - cx + px, eye[1] - cy + py, eye[2] - cz + pz), radius
+
+
+@inlined
+def _colours(paints, where):
+    """The diffuse colours of the spheres at these places."""
+    if same(where):
+        i = 4 * np.uint64(paints.material[np.uint64(first_of(where))])
+        colours, one = paints.colours, np.uint64(1)
+        return spread(colours[i]), spread(colours[i + one]), spread(colours[i + one + one]), spread(0.0)
+    return gather_rows(paints.colours, gather(paints.material, where))
+
+
+@inlined
+def _over(paints, hit, red, green, blue):
+    """The background where nothing is hit."""
+    background = paints.background
+    return (
+        select(hit, red, spread(background[0])),
+        select(hit, green, spread(background[1])),
+        select(hit, blue, spread(background[2])),
+    )
+
+
+@borrowing
+def _hits_tile(view, scratch, tile, paints, out):
+    """t and index as they are in the buffer."""
+    for row in range(tile.top, tile.bottom):
+        a1, a0, _, _, _ = _line(view, row)
+        start = np.uint64((row - out.first_row) * out.width)
+        for x in range(tile.left, tile.right, WIDTH):
+            across, place, at = load(view.across, x), _place(tile, row, x), start + np.uint64(x)
+            t = load(scratch.k, place) / ((across * view.a2 + a1) * across + a0)
+            if x + WIDTH <= tile.right:
+                store(out.t, at, t)
+                store(out.index, at, load(scratch.index, place))
+            else:
+                store(scratch.batch, 0, t)
+                for pixel in range(np.uint64(tile.right - x)):
+                    out.t[at + pixel] = scratch.batch[pixel]
+                    out.index[at + pixel] = scratch.index[place + pixel]
+
+
+@borrowing
+def _no_hits_tile(scratch, tile, paints, out):
+    for row in range(tile.top, tile.bottom):
+        start = (row - out.first_row) * out.width
+        for x in range(start + tile.left, start + tile.right):
+            out.t[x], out.index[x] = np.inf, -1
+
+
+paint_flat = _build(_flat_tile, _fill_tile)
+paint_diffuse = _build(_diffuse_tile, _fill_tile)
+paint_normal = _build(_normal_tile, _fill_tile)
+find_hits = _build(_hits_tile, _no_hits_tile)

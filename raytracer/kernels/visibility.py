@@ -1,0 +1,167 @@
+"""What the pixels of one tile see first: a depth buffer, and one sphere after the other drawn into it.
+
+    ┌ tile ───────────────┐        k       a·t of the nearest hit so far: a = D·D is the same for all spheres of a pixel
+    │      ┌ box ┐        │        index   which sphere that is
+    │      │▒▒▒▒▒│        │        doubt   whether float64 cannot tell
+    │      │▒▒▒▒▒│        │
+    │      └─────┘        │        rows of TILE_WIDTH pixels, and 8 to spare: a box's last eight may reach beyond
+    └─────────────────────┘
+
+A box has no mask: beyond it the sphere is not hit. What the spheres of eight list entries need is computed at once.
+"""
+
+import numpy as np
+
+from raytracer.certified import K_ERROR, approach, arrive, edge_of, inner, meet, side_of
+from raytracer.kernels.bounds import TILE_HEIGHT, TILE_WIDTH
+from raytracer.kernels.compiler import borrowing, compiled, inlined
+from raytracer.kernels.lanes import WIDTH, any_of, bits_of, blend, fetch_ahead, gather_rows, load, spread, store
+
+STRIDE = TILE_WIDTH + WIDTH
+_AHEAD = 24  # list entries: how long before it is wanted a sphere is fetched
+
+
+@borrowing
+def see_tile(view, slow, bins, tile, scratch):
+    """Fill the depth buffer of a tile; returns whether there are doubts."""
+    first_row, end_row = tile.top, tile.bottom
+    for p in range(np.uint64(0), np.uint64(TILE_HEIGHT * STRIDE), np.uint64(WIDTH)):
+        store(scratch.k, p, spread(np.inf))
+        store(scratch.index, p, spread(np.int32(-1)))
+    doubts = False
+    for i in range(len(slow.ids)):
+        doubts |= _draw_slow(view, slow, i, tile.left, first_row, end_row, scratch)
+    for i in range(bins.starts[tile.number], bins.starts[tile.number + 1], WIDTH):
+        doubts |= _draw_eight(view, bins, i, bins.starts[tile.number + 1], tile.left, first_row, scratch)
+    return doubts
+
+
+@inlined
+def _draw_eight(view, bins, first, end, left, top, scratch):
+    """Draw up to eight spheres of the tile's list."""
+    u, v, back, batch = view.u, view.v, view.back, scratch.batch
+    x, y, z, radius = gather_rows(view.balls, load(bins.ids, first))
+    lx, ly, lz = view.eye[0] - x, view.eye[1] - y, view.eye[2] - z
+    c, square = side_of(lx, ly, lz, radius)
+    store(batch, 0, inner(u[0], u[1], u[2], lx, ly, lz))
+    store(batch, 8, inner(v[0], v[1], v[2], lx, ly, lz))
+    store(batch, 16, -inner(back[0], back[1], back[2], lx, ly, lz))
+    store(batch, 24, c)
+    store(batch, 32, edge_of(c, square, view.reach, view.kappa))
+    doubts = False
+    for j in range(np.uint64(0), np.uint64(min(WIDTH, end - first))):
+        i = bins.ids[np.uint64(first) + j]
+        fetch_ahead(view.balls, np.uint64(4) * np.uint64(bins.ids[np.uint64(first + _AHEAD) + j]))
+        corners = bins.corners[np.uint64(first) + j]
+        start, stop, high, low = corners & 255, corners >> 8 & 255, corners >> 16 & 255, corners >> 24
+        hu, hv, hw = batch[j], batch[j + np.uint64(8)], batch[j + np.uint64(16)]
+        c, edge = batch[j + np.uint64(24)], batch[j + np.uint64(32)]
+        for line in range(high, low):
+            row = np.uint64(top + line)
+            hr = view.up[row] * hv + hw
+            doubts |= _draw_row(view, i, row, line, left, start, stop, hu, hr, c, edge, scratch)
+    return doubts
+
+
+@inlined
+def _draw_row(view, i, row, line, left, start, stop, hu, hr, c, edge, scratch):
+    """One quick sphere in one row of its box."""
+    a2, a1, a0 = view.a2, view.a1[row], view.a0[row]
+    x, end = np.uint64(left + start), np.uint64(left + stop)
+    p = np.uint64(line * STRIDE + start)
+    doubts = False
+    while x < end:
+        across, best = load(view.across, x), load(scratch.k, p)
+        a = (across * a2 + a1) * across + a0
+        k, wins, doubt = approach(across * hu + hr, a, c, edge, best)
+        store(scratch.k, p, blend(wins, k, best))
+        store(scratch.index, p, blend(wins, spread(i), load(scratch.index, p)))
+        if any_of(doubt):
+            _note(scratch.doubt, p, bits_of(doubt))
+            doubts = True
+        x += np.uint64(WIDTH)
+        p += np.uint64(WIDTH)
+    return doubts
+
+
+@borrowing
+def _draw_slow(view, slow, i, left, top, bottom, scratch):
+    """Any sphere in its box."""
+    start, stop = max(slow.boxes[i, 0] - left, 0), min(slow.boxes[i, 1] - left, TILE_WIDTH)
+    c, c_error, size, radius = slow.seen.c[i], slow.seen.c_error[i], slow.seen.size[i], slow.seen.radius[i]
+    doubts = False
+    for row in range(max(slow.boxes[i, 2], top), min(slow.boxes[i, 3], bottom)):
+        hu, hr = slow.seen.hu[i], view.up[row] * slow.seen.hv[i] + slow.seen.hw[i]
+        x, end = np.uint64(left + start), np.uint64(left + stop)
+        p = np.uint64((row - top) * STRIDE + start)
+        while x < end:
+            across, best = load(view.across, x), load(scratch.k, p)
+            a = (across * view.a2 + view.a1[row]) * across + view.a0[row]
+            t, _, low = meet(across * hu + hr, a, c, c_error, size, radius, view.reach, K_ERROR / 2)
+            k, wins, doubt = arrive(t, low, a, best)
+            store(scratch.k, p, blend(wins, k, best))
+            store(scratch.index, p, blend(wins, spread(slow.ids[i]), load(scratch.index, p)))
+            if any_of(doubt):
+                _note(scratch.doubt, p, bits_of(doubt))
+                doubts = True
+            x += np.uint64(WIDTH)
+            p += np.uint64(WIDTH)
+    return doubts
+
+
+@inlined
+def _note(doubt, p, bits):
+    """Mark the pixels from p on whose bits are set."""
+    for lane in range(WIDTH):
+        if bits >> lane & 1:
+            doubt[p + np.uint64(lane)] = True
+
+
+@borrowing
+def list_doubts(view, tile, scratch, doubts):
+    """Add the tile's doubtful pixels, as row · width + column, to a list, whose first element is its length."""
+    width = len(view.across) - WIDTH
+    for line in range(tile.bottom - tile.top):
+        for x in range(tile.right - tile.left):
+            if scratch.doubt[line * STRIDE + x]:
+                doubts[0] += 1
+                doubts[doubts[0]] = (tile.top + line) * width + tile.left + x
+    scratch.doubt[:] = False
+
+
+@compiled
+def candidates(slow, bins, xs, ys):
+    """`plain.candidates_of` for the spheres of a screen: starts and ids."""
+    starts, no_ids = np.zeros(len(xs) + 1, np.int64), np.empty(0, np.int32)
+    for k in range(len(xs)):
+        starts[k + 1] = starts[k] + _merge(slow, bins, xs[k], ys[k], no_ids, 0)
+    ids = np.empty(starts[-1], np.int32)
+    for k in range(len(xs)):
+        _merge(slow, bins, xs[k], ys[k], ids, starts[k])
+    return starts, ids
+
+
+@borrowing
+def _merge(slow, bins, x, y, ids, at):
+    """Write a pixel's candidates, ascending, to `ids` from `at` on, if it has room; returns how many there are."""
+    tile, found, next_slow = y // TILE_HEIGHT * bins.columns + x // TILE_WIDTH, 0, 0
+    for place in range(bins.starts[tile], bins.starts[tile + 1] + 1):
+        last = place == bins.starts[tile + 1]
+        while next_slow < len(slow.ids) and (last or slow.ids[next_slow] < bins.ids[place]):
+            box = slow.boxes[next_slow]
+            if box[0] <= x and x < box[1] and box[2] <= y and y < box[3]:
+                if len(ids):
+                    ids[at + found] = slow.ids[next_slow]
+                found += 1
+            next_slow += 1
+        if not last and _holds(bins.corners[place], x % TILE_WIDTH, y % TILE_HEIGHT):
+            if len(ids):
+                ids[at + found] = bins.ids[place]
+            found += 1
+    return found
+
+
+@inlined
+def _holds(corners, x, y):
+    left, right, top, bottom = corners & 255, corners >> 8 & 255, corners >> 16 & 255, corners >> 24
+    return left <= x and x < right and top <= y and y < bottom

@@ -1,0 +1,304 @@
+"""Eye rays at the machine's limit: `certified`, compiled.
+
+Eye rays share their origin, so a sphere covers an ellipse on the screen, and only pixels in its box can hit it:
+
+    bound       the box of each sphere, eight at a time, and how many reach into each tile of the screen
+    begin, fill the list of each tile
+    paint       a tile at a time: a small depth buffer, then colours, while all of it is in the core's first cache
+
+No tree, no ray objects, nothing normalised, and only one square root for a pixel and a sphere. Pixels of which float64
+is not certain are listed, decided by `settle`, and painted anew.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from itertools import chain
+from queue import Empty, Full, LifoQueue
+from types import ModuleType
+from typing import NamedTuple
+
+import numpy as np
+from numpy.lib.stride_tricks import as_strided
+
+from raytracer import plain
+from raytracer.arrays import Bins, Candidates, Canvas, HitRows, Hits, Paints, Scratch, Seen, Sides, Slow, View
+from raytracer.boxes import Lens, make_lens
+from raytracer.camera import Raster, eye_grid
+from raytracer.eye import bundle_of, usable_spread
+from raytracer.plan import Plan
+from raytracer.pool import cores, share
+from raytracer.scene import Materials, Scene, Spheres
+from raytracer.settle import Bundle, Index, Targets, known_in_integers, settled
+from raytracer.shading import to_byte
+from raytracer.stages import light_from_eye
+from raytracer.units import sphere_units
+
+_SPARE = 32  # list entries beyond the last that a kernel may look at
+_DOUBTS = 1 << 15  # pixels that a thread lists before they are decided
+_FEW = 1 << 13  # spheres below which one thread sorts them sooner than two
+_MOST_WORKERS = 8  # that sort: each counts all tiles anew
+_BAND_PIXELS = 1 << 18  # of a numpy stage's block
+_PIXELS_A_MOMENT, _SPHERES_A_MOMENT = 1 << 21, 1 << 15  # what is drawn in two milliseconds or so
+_CACHE_LINE = 64  # bytes
+_KEPT = 1 << 26  # bytes of a workspace that is kept
+
+_NOT_A_NUMBER_IS_NO_ERROR = np.errstate(all="ignore")
+
+
+class Workspace:
+    """Arrays that outlive a picture: fresh memory costs more than drawing a small one."""
+
+    def __init__(self) -> None:
+        self._arrays: dict[tuple[str, int], np.ndarray] = {}
+
+    def array(self, size: int, kind: type, name: str, worker: int = 0) -> np.ndarray:
+        """An array of that size, with anything in it."""
+        kept = self._arrays.get((name, worker))
+        if kept is None or len(kept) < size:
+            kept = self._arrays[name, worker] = _aligned(size, kind)
+        return kept[:size]
+
+    def zeros(self, size: int, kind: type, name: str, worker: int = 0) -> np.ndarray:
+        array = self.array(size, kind, name, worker)
+        array[:] = 0
+        return array
+
+    @property
+    def nbytes(self) -> int:
+        return sum(array.nbytes for array in self._arrays.values())
+
+
+def _aligned(size: int, kind: type) -> np.ndarray:
+    """A fresh array that begins where a line of the processor's cache does."""
+    raw = np.empty(size * np.dtype(kind).itemsize + _CACHE_LINE, np.uint8)
+    start = -raw.ctypes.data % _CACHE_LINE
+    return raw[start : start + size * np.dtype(kind).itemsize].view(kind)
+
+
+_idle: LifoQueue[Workspace] = LifoQueue(2)
+
+
+@contextmanager
+def _workspace() -> Iterator[Workspace]:
+    try:
+        workspace = _idle.get_nowait()
+    except Empty:
+        workspace = Workspace()
+    yield workspace
+    if workspace.nbytes < _KEPT:
+        with suppress(Full):
+            _idle.put_nowait(workspace)
+
+
+class Screen(NamedTuple):
+    """A picture's spheres, sorted into the tiles of the screen."""
+
+    raster: Raster
+    unit: int  # lengths below are counted in 2**unit of the scene's
+    origin: np.ndarray  # (3,)
+    spheres: int
+    order: np.ndarray | None  # int32 (spheres,), their places in the file; None if they are all of its shapes
+    view: View
+    slow: Slow
+    bins: Bins
+    targets: Targets
+    desks: list[tuple[Scratch, np.ndarray]]  # of each thread, and its list of doubtful pixels, which begins with a length
+
+    @property
+    def boxes(self) -> np.ndarray:
+        """The box of each sphere: int32 (spheres, 4)."""
+        boxes = self.bins.boxes.reshape(-1, 4)[: self.spheres].copy()
+        boxes[self.slow.ids] = self.slow.boxes
+        return boxes
+
+    def bands(self, shading: float = 0.0) -> list[slice]:
+        """The picture's rows, cut between tiles into some pieces for each core, so that all are done at one time."""
+        height = self.kernels.TILE_HEIGHT
+        rows, pixels = -(-self.raster.height // height), self.raster.height * self.raster.width
+        moments = (len(self.slow.ids) + shading / 8) * pixels / _PIXELS_A_MOMENT + len(self.bins.ids) / _SPHERES_A_MOMENT
+        step = max(1, min(rows // max(4 * cores(), int(moments)), _BAND_PIXELS // (height * self.raster.width)))
+        cuts = [row * height for row in range(0, rows, step)]
+        return [slice(a, b) for a, b in zip(cuts, [*cuts[1:], self.raster.height], strict=True)]
+
+    @_NOT_A_NUMBER_IS_NO_ERROR
+    def hits(self, rows: slice, worker: int = 0, polished: bool = False) -> Hits:
+        """What the rays of these rows, cut between tiles, hit first: as `Eye.hits`."""
+        hits = Hits(np.empty((rows.stop - rows.start, self.raster.width)),
+                    np.empty((rows.stop - rows.start, self.raster.width), np.int32))  # fmt: skip
+        out = HitRows(hits.t.reshape(-1), hits.index.reshape(-1), rows.start, self.raster.width)
+        for doubtful in chain(self.paint("find_hits", rows, worker, _NO_PAINTS, out), self.doubtful(worker)):
+            where = doubtful.ys - rows.start, doubtful.xs
+            hits.t[where], hits.index[where] = doubtful.hits()
+        return self.in_scene(hits)
+
+    def in_scene(self, hits: Hits) -> Hits:
+        """t in the scene's unit of length, and places in the file in place of numbers of spheres."""
+        t = np.ldexp(hits.t, self.unit) if self.unit else hits.t
+        if self.order is None:
+            return Hits(t, hits.index)
+        return Hits(t, np.where(hits.index >= 0, self.order[hits.index], np.int32(-1)))
+
+    @property
+    def kernels(self) -> ModuleType:
+        return self.targets.path
+
+    def paint(self, painter: str, rows: slice, worker: int, paints: Paints, out: Canvas | HitRows) -> Iterator[Pixels]:
+        """Paint these rows, cut between tiles, by a kernel; yields doubtful pixels when there is no room for more.
+
+        What is left of them `doubtful` tells.
+        """
+        kernel, (scratch, doubts) = getattr(self.kernels, painter), self.desks[worker]
+        height, columns = self.kernels.TILE_HEIGHT, self.bins.columns
+        tile, last = rows.start // height * columns, -(-rows.stop // height) * columns
+        while (tile := kernel(self.view, self.slow, self.bins, tile, last, scratch, doubts, paints, out)) < last:
+            yield from self.doubtful(worker)
+
+    def doubtful(self, *workers: int) -> Iterator[Pixels]:
+        """The doubtful pixels that these workers have listed, all together, if there are any."""
+        lists = [self.desks[worker][1] for worker in workers]
+        pixels = np.concatenate([doubts[1 : 1 + doubts[0]] for doubts in lists])
+        if pixels.size:
+            for doubts in lists:
+                doubts[0] = 0
+            ys, xs = np.divmod(pixels, self.raster.width)
+            yield Pixels(self, xs, ys)
+
+
+class Pixels(NamedTuple):
+    """Some pixels of a screen, to be decided by the levels above float64."""
+
+    screen: Screen
+    xs: np.ndarray  # int64 (n,), their columns
+    ys: np.ndarray
+
+    @_NOT_A_NUMBER_IS_NO_ERROR
+    def hits(self) -> Hits:
+        """What they hit, certain."""
+        return settled(self, (np.arange(len(self.xs)),), self.screen.targets)
+
+    def bundle(self, which: Index) -> Bundle:
+        return bundle_of(self.screen.raster, self.screen.origin, self.xs[which], self.ys[which])
+
+    def candidates(self, which: Index) -> Candidates:
+        screen = self.screen
+        return Candidates(*screen.kernels.candidates(screen.slow, screen.bins, self.xs[which], self.ys[which]))
+
+
+@contextmanager
+def open_screen(scene: Scene, raster: Raster, kernels: ModuleType, threads: int | None = None) -> Iterator[Screen]:
+    """Sort the scene's spheres into the tiles of the screen. It holds until the context ends."""
+    with _workspace() as workspace, np.errstate(all="ignore"):
+        unit, origin, balls = sphere_units(scene.camera.eye, scene.spheres)
+        lens, view = make_lens(raster), _view(raster, origin, balls)
+        bins, slow_ids = _sort(workspace, kernels, lens, view, len(scene.spheres), threads)
+        slow, targets = _slow(lens, view, origin, balls, slow_ids, kernels, bins)
+        desks = [_desk(workspace, kernels, worker) for worker in range(threads or cores())]
+        order = scene.spheres.order if len(scene.triangles) and len(scene.spheres) else None
+        yield Screen(raster, unit, origin, len(scene.spheres), order, view, slow, bins, targets, desks)
+
+
+def make_paints(plan: Plan, screen: Screen) -> Paints:
+    """What the plan's stage is painted with."""
+    flat, background = plan.stage.flat(plan.scene)
+    lights = [
+        (*light_from_eye(light, plan.scene.camera, screen.unit).tolist(), *light.colour) for light in plan.lights
+    ]
+    materials = plan.scene.materials
+    return Paints(
+        to_byte(np.array(background)), to_byte(np.array(flat)), np.array(lights, np.float64).reshape(-1, 6),
+        plan.scene.spheres.material, materials.diffuse.reshape(-1),
+    )  # fmt: skip
+
+
+_NO_PAINTS = Paints(np.zeros(3), np.zeros(3), np.empty((0, 6)), Spheres().material, Materials().diffuse.reshape(-1))
+
+
+_NO_SPHERES = np.empty(0)
+_NONE_SLOW = Slow(np.empty(0, np.int32), np.empty((0, 4), np.int32), Seen(*[_NO_SPHERES] * len(Seen._fields)))
+
+
+def make_canvas(picture: np.ndarray) -> Canvas | None:
+    """The bytes of a picture (height, width, 3); None if its pixels are not three or four bytes apart."""
+    height, width, _ = picture.shape
+    row, pixel, byte = picture.strides
+    if byte != 1 or pixel not in (3, 4) or row < width * pixel:
+        return None
+    size = (height - 1) * row + (width - 1) * pixel + 3
+    flat = picture.reshape(-1) if picture.flags.c_contiguous else as_strided(picture, (size,), (1,))
+    return Canvas(flat, row, pixel, width if pixel == 3 else width - 1)
+
+
+def _desk(workspace: Workspace, kernels: ModuleType, worker: int) -> tuple[Scratch, np.ndarray]:
+    size, array = kernels.TILE_HEIGHT * kernels.STRIDE, workspace.array
+    doubts = array(_DOUBTS, np.int64, "doubts", worker)
+    doubts[0] = 0
+    scratch = Scratch(
+        array(size, np.float64, "k", worker),
+        array(size, np.int32, "index", worker),
+        workspace.zeros(size, np.bool_, "doubt", worker),
+        array(64, np.float64, "batch", worker),
+        array(32, np.uint8, "rest", worker),
+    )
+    return scratch, doubts
+
+
+def _view(raster: Raster, origin: np.ndarray, balls: np.ndarray) -> View:
+    grid, (x, y, z) = eye_grid(raster), origin.tolist()
+    across = np.concatenate([grid.across, np.full(8, grid.across[-1])])
+    return View(
+        across, grid.up, grid.a1, grid.a0, grid.a2, grid.u, grid.v, grid.back, grid.reach, usable_spread(raster),
+        (x, y, z), balls.reshape(-1),
+    )  # fmt: skip
+
+
+def _sort(
+    workspace: Workspace, kernels: ModuleType, lens: Lens, view: View, spheres: int, threads: int | None
+) -> tuple[Bins, np.ndarray]:
+    """The lists of all tiles; and the slow spheres, which are in none."""
+    columns, rows = -(-len(view.across) // kernels.TILE_WIDTH), -(-len(view.up) // kernels.TILE_HEIGHT)
+    columns = -(-(len(view.across) - 8) // kernels.TILE_WIDTH)
+    workers = 1 if spheres < _FEW else min(threads or cores(), _MOST_WORKERS)
+    cuts = [spheres * worker // workers // 8 * 8 for worker in range(workers)] + [spheres]
+    boxes = workspace.array(4 * (spheres + 8), np.int32, "boxes")
+    counts = workspace.zeros(workers * columns * rows, np.int64, "counts").reshape(workers, -1)
+    starts = workspace.array(columns * rows + 1, np.int64, "starts")
+    slow = 0
+
+    def bound(part: int, worker: int) -> int:
+        return int(
+            kernels.bound(
+                lens, view.eye, view.reach, view.kappa, view.balls, cuts[part], cuts[part + 1], boxes, counts[part],
+                columns,
+            )
+        )  # fmt: skip
+
+    def add(found: int) -> None:
+        nonlocal slow
+        slow += found
+
+    def fill(part: int, worker: int) -> None:
+        kernels.fill(boxes, cuts[part], cuts[part + 1], counts[part], ids, corners, columns)
+
+    share(list(range(workers)), bound, threads, add)
+    kernels.begin(counts, starts)
+    ids = workspace.array(int(starts[-1]) + _SPARE, np.int32, "ids")
+    corners = workspace.array(len(ids), np.uint32, "corners")
+    ids[int(starts[-1]) :] = 0
+    share(list(range(workers)), fill, threads)
+    which = np.flatnonzero(boxes[: 4 * spheres : 4] < 0) if slow else np.empty(0, np.int64)
+    return Bins(boxes, starts, ids, corners, columns), which.astype(np.int32)
+
+
+def _slow(
+    lens: Lens, view: View, origin: np.ndarray, balls: np.ndarray, ids: np.ndarray, kernels: ModuleType, bins: Bins
+) -> tuple[Slow, Targets]:
+    """What has to be known of the slow spheres; and all spheres as the levels above float64 want them."""
+    if not len(ids):
+        return _NONE_SLOW, Targets(balls, Sides.unknown(), kernels)
+    some = balls[ids]
+    boxes, front = plain.bound(lens, origin, some)
+    seen = plain.see(view, view.kappa, origin, some, front)
+    seen, sides = known_in_integers(origin, some, seen)
+    return Slow(ids, boxes, seen), Targets(balls, sides._replace(which=ids[sides.which]), kernels)

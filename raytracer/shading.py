@@ -1,0 +1,32 @@
+"""What a hit looks like: the formulas of the built-in stages, for one pixel or for many.
+
+Plain arithmetic on numbers, arrays or lanes alike (see `twofold`): numpy and the kernels draw the same bytes. A hit is
+given by t, its ray's direction D and L = eye − centre, all in one unit of length. P = t·D is the hit point as seen from
+the eye, and P + L as seen from the centre, which is r·N: neither needs the point itself, whose digits may be too few.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from raytracer.twofold import Number, select
+
+Three = tuple[Number, Number, Number]
+
+
+def towards(p: Three, n: Three, light: Three) -> tuple[Number, Number]:
+    """n·T and T·T for T from the point P to a light, both as seen from the eye."""
+    x, y, z = light[0] - p[0], light[1] - p[1], light[2] - p[2]
+    return n[0] * x + n[1] * y + n[2] * z, x * x + y * y + z * z
+
+
+def cosine(facing: Number, square: Number, radius: Number) -> Number:
+    """max(0, N·L) from what `towards` says, n = r·N; 0 where the light is at the point."""
+    return select(facing > 0.0, facing / (radius * np.sqrt(square)), 0.0)
+
+
+def to_byte(colour: Number) -> Number:
+    """255 · clip(C, 0, 1) + ½, to be cut off to a whole number; what is not a number is black."""
+    positive = select(colour > 0.0, colour, 0.0)
+    return select(positive < 1.0, positive, 1.0) * 255.0 + 0.5
+
