@@ -14,10 +14,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from decimal import MAX_EMAX, MIN_EMIN, Decimal, localcontext
 from fractions import Fraction
-from math import inf, isqrt, lcm
+from math import frexp, inf, isqrt, lcm, ldexp, trunc
 from typing import NamedTuple
 
 Exact = float | Fraction  # a finite float64 stands for itself, exactly
+
+Surd = tuple[int, int, int]  # base + sign · √radicand, all of them integers
+
+_MANTISSA = 53  # a float64's bits
+_BITS = 128  # of a square root, to begin with: enough for a float64 even if 60 of them cancel
 
 
 class Root(NamedTuple):
@@ -31,21 +36,11 @@ class Root(NamedTuple):
 
     def is_nearer(self, other: Root) -> bool:
         """Whether this root comes before another of the same ray."""
-        return _sign_with_two_roots(self.base - other.base, self.sign, self.radicand, other.sign, other.radicand) < 0
+        return _is_less(self[:3], other[:3])
 
     def nearest_float(self) -> float:
         """The float64 nearest to the root: +inf beyond the largest."""
-        bits = 0
-        while True:
-            scaled = self.radicand << 2 * bits
-            root = isqrt(scaled)
-            exact = root * root == scaled
-            low = (self.base << bits) + self.sign * root
-            high = low if exact else low + self.sign
-            nearest = _ratio(low * self.over, self.under << bits)
-            if exact or nearest == _ratio(high * self.over, self.under << bits):
-                return nearest
-            bits = 2 * bits or 64
+        return _nearest_float(self[:3], self.over, self.under)
 
     def decimal(self, digits: int) -> Decimal:
         """The root, to so many digits: off by less than one in the last."""
@@ -103,18 +98,27 @@ def nearest_hit(
 
 def nearest_of(lengths: list[Exact], direction: Sequence[Exact], unit: int = 1) -> tuple[float, int]:
     """`nearest_hit`, its lengths in one list: the origin, then centre and radius of each sphere."""
-    best, index = None, -1
-    for i, root in enumerate(_hits(lengths, direction, unit)):
-        if root is not None and (best is None or root.is_nearer(best)):
-            best, index = root, i
-    return (inf, -1) if best is None else (best.nearest_float(), index)
+    whole, length_unit = _integers(lengths)
+    steps, step_unit = _integers(direction)
+    eye, a = whole[:3], _square(steps)
+    best = None
+    for k in range(3, len(whole), 4):
+        found = _hit(eye, steps, a, whole[k : k + 4])
+        if found is not None and (best is None or _is_less(found, best)):
+            best, at = found, k
+    return (inf, -1) if best is None else (_nearest_float(best, step_unit * unit, a * length_unit), at // 4)
 
 
 def hits(
     origin: Sequence[Exact], direction: Sequence[Exact], spheres: Iterable[tuple[Sequence[Exact], Exact]], unit: int = 1
 ) -> list[Root | None]:
     """The smallest positive root of each sphere, or None for a miss; the ray's direction is `direction` / `unit`."""
-    return _hits(_flat(origin, spheres), direction, unit)
+    whole, length_unit = _integers(_flat(origin, spheres))
+    steps, step_unit = _integers(direction)
+    eye, a = whole[:3], _square(steps)
+    over, under = step_unit * unit, a * length_unit
+    found = [_hit(eye, steps, a, whole[k : k + 4]) for k in range(3, len(whole), 4)]
+    return [None if surd is None else Root(*surd, over, under) for surd in found]
 
 
 def _flat(origin: Sequence[Exact], spheres: Iterable[tuple[Sequence[Exact], Exact]]) -> list[Exact]:
@@ -124,48 +128,77 @@ def _flat(origin: Sequence[Exact], spheres: Iterable[tuple[Sequence[Exact], Exac
     return numbers
 
 
-def _hits(lengths: list[Exact], direction: Sequence[Exact], unit: int) -> list[Root | None]:
-    whole, length_unit = _integers(lengths)
-    steps, step_unit = _integers(direction)
-    over, eye = step_unit * unit, whole[:3]
-    return [_hit(eye, steps, whole[k : k + 4], over, length_unit) for k in range(3, len(whole), 4)]
-
-
 def side(origin: Sequence[Exact], centre: Sequence[Exact], radius: Exact) -> Fraction:
     """c = |origin − centre|² − radius²: negative inside the sphere, zero on it, positive outside."""
     distances = (Fraction(o) - Fraction(c) for o, c in zip(origin, centre, strict=True))
     return sum((x * x for x in distances), Fraction(0)) - Fraction(radius) ** 2
 
 
-def _hit(eye: list[int], steps: list[int], sphere: list[int], over: int, under: int) -> Root | None:
-    middle, radicand, a = _reduced(eye, steps, sphere)
+def _hit(eye: list[int], steps: list[int], a: int, sphere: list[int]) -> Surd | None:
+    """The smallest root above 0, but for the factor that all roots of the ray share."""
+    middle, radicand = _reduced(eye, steps, a, sphere)
     if radicand < 0:
         return None
     square = middle * middle
-    if middle > 0 and square > radicand:
-        return Root(middle, -1, radicand, over, a * under)
-    if middle > 0 or square < radicand:
-        return Root(middle, 1, radicand, over, a * under)
-    return None
+    if square < radicand:
+        return middle, 1, radicand
+    if middle <= 0:
+        return None
+    if square > radicand:
+        return middle, -1, radicand
+    return 2 * middle, 1, 0  # the origin is on the sphere: one root is 0, and the other has no square root left
 
 
 def _roots(
     eye: list[int], steps: list[int], sphere: list[int], over: int, under: int
 ) -> tuple[Root, Root] | tuple[None, None]:
-    middle, radicand, a = _reduced(eye, steps, sphere)
+    a = _square(steps)
+    middle, radicand = _reduced(eye, steps, a, sphere)
     if radicand < 0:
         return None, None
     return Root(middle, -1, radicand, over, a * under), Root(middle, 1, radicand, over, a * under)
 
 
-def _reduced(eye: list[int], steps: list[int], sphere: list[int]) -> tuple[int, int, int]:
-    """−D·L, Δ and D·D."""
-    (ox, oy, oz), (dx, dy, dz), (cx, cy, cz, radius) = eye, steps, sphere
-    lx, ly, lz = ox - cx, oy - cy, oz - cz
-    a = dx * dx + dy * dy + dz * dz
+def _square(steps: list[int]) -> int:
+    """D·D."""
+    x, y, z = steps
+    return x * x + y * y + z * z
+
+
+def _reduced(eye: list[int], steps: list[int], a: int, sphere: list[int]) -> tuple[int, int]:
+    """−D·L and Δ, with D·D = a."""
+    ox, oy, oz = eye
+    dx, dy, dz = steps
+    cx, cy, cz, radius = sphere
+    lx, ly, lz = cx - ox, cy - oy, cz - oz  # −L: squares do not mind
     x, y, z = dy * lz - dz * ly, dz * lx - dx * lz, dx * ly - dy * lx
-    radicand = radius * radius * a - (x * x + y * y + z * z)
-    return -(dx * lx + dy * ly + dz * lz), radicand, a
+    return dx * lx + dy * ly + dz * lz, radius * radius * a - (x * x + y * y + z * z)
+
+
+def _nearest_float(surd: Surd, over: int, under: int) -> float:
+    """The float64 nearest to surd · over / under: +inf beyond the largest.
+
+    As many bits of the surd are worked out as it takes for the float64 to be the same, whatever the others may be.
+    """
+    base, sign, radicand = surd
+    bits = _BITS
+    try:
+        while radicand:
+            up = bits - radicand.bit_length() // 2
+            up, down = (up, 0) if up > 0 else (0, -up)
+            scaled = radicand << 2 * up >> 2 * down
+            root = isqrt(scaled)
+            near = (base << up >> down) + sign * root  # the surd is above near − 1, and below near + 2
+            top, bottom = over << down, under << up
+            nearest = (near - 1) * top / bottom
+            if nearest == (near + 2) * top / bottom:
+                return nearest
+            if not down and root * root == scaled:
+                return near * top / bottom
+            bits *= 2
+        return base * over / under
+    except OverflowError:
+        return inf
 
 
 def _sign_with_root(base: int, sign: int, radicand: int) -> int:
@@ -191,18 +224,37 @@ def _sign(number: int) -> int:
     return (number > 0) - (number < 0)
 
 
-def _integers(numbers: Iterable[Exact]) -> tuple[list[int], int]:
-    """Integers, and how many of them make 1: numbers = integers / that."""
-    ratios = [number.as_integer_ratio() for number in numbers]
-    whole = lcm(*[d for _, d in ratios])
-    if whole == 1:
-        return [n for n, _ in ratios], 1
-    return [n * (whole // d) for n, d in ratios], whole
+def _is_less(surd: Surd, other: Surd) -> bool:
+    """Whether one root of a ray comes before another."""
+    base, sign, radicand = surd
+    less_base, less_sign, less_radicand = other
+    return _sign_with_two_roots(base - less_base, sign, radicand, less_sign, less_radicand) < 0
 
 
-def _ratio(numerator: int, denominator: int) -> float:
-    """Rounded to nearest; Python's division of integers is, but for its refusal to overflow."""
+def _integers(numbers: Sequence[Exact]) -> tuple[list[int], int]:
+    """Integers, and how many of them make 1: numbers = integers / that.
+
+    In one pass and with one power of two for all: this is most of what a ray costs.
+    """
+    smallest = inf
+    for number in numbers:
+        if type(number) is not float:
+            return _integers_of_any(numbers)
+        if -smallest < number < smallest and number:
+            smallest = abs(number)
+    bits = max(0, _MANTISSA - frexp(smallest)[1])  # behind the point; no larger number has more
     try:
-        return numerator / denominator
-    except OverflowError:
-        return inf
+        return [trunc(ldexp(number, bits)) for number in numbers], 1 << bits
+    except OverflowError:  # more than a float64 can hold: the exponents are added to integers instead
+        parts = map(frexp, numbers)
+        return [trunc(ldexp(part, _MANTISSA)) << bits + exponent for part, exponent in parts], 1 << bits + _MANTISSA
+
+
+def _integers_of_any(numbers: Sequence[Exact]) -> tuple[list[int], int]:
+    """`_integers`, of numbers that are not all floats."""
+    whole = [number for number in numbers if type(number) is int]
+    if len(whole) == len(numbers):
+        return whole, 1
+    ratios = [number.as_integer_ratio() for number in numbers]
+    unit = lcm(*[d for _, d in ratios])
+    return [n * (unit // d) for n, d in ratios], unit
