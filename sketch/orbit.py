@@ -55,8 +55,8 @@ def turned(camera: Camera, orbit: Orbit, pivot: Vector) -> Camera:
     A camera that would be of no use stays where it is: one beyond float64, or of a frame so flat that rounding has made
     a plane of it.
     """
-    rotation = _rotation(camera, orbit)
     with np.errstate(all="ignore"):
+        rotation = _rotation(camera, orbit)
         arm = 2.0 ** (-orbit.nearer / DOUBLE) * (rotation @ (np.array(camera.eye) - pivot))
         u, v, w = (vector(rotation @ axis) for axis in (camera.u, camera.v, camera.w))
         there = Camera(vector(arm + pivot), u, v, w, camera.fov)
@@ -82,9 +82,10 @@ def _about(axis: np.ndarray, angle: float) -> np.ndarray:
 def _unit_frame(camera: Camera) -> tuple[np.ndarray, np.ndarray]:
     """u, v and w as rows of length 1, and how long they were."""
     frame = np.array([camera.u, camera.v, camera.w])
-    lengths = _length(frame)
-    frame = frame / np.abs(frame).max(axis=1, keepdims=True)
-    return frame / _length(frame)[:, None], lengths
+    size = np.abs(frame).max(axis=1, keepdims=True)
+    unit = frame / size
+    lengths = _length(unit)[:, None]
+    return unit / lengths, (lengths * size)[:, 0]
 
 
 def _length(vectors: np.ndarray) -> np.ndarray:

@@ -129,7 +129,7 @@ def _remark(view: View, drawing: Drawing | None) -> tuple[str, Colour]:
 
 
 def help_panel() -> Panel:
-    return Panel("Keys", (*((row.label, row.does) for row in KEYS), *MOUSE))
+    return Panel("Keys and mouse", (*((row.label, row.does) for row in KEYS), *MOUSE))
 
 
 def error_panel(path: Path, error: str) -> Panel:

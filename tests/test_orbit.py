@@ -115,6 +115,15 @@ def test_the_near_side_follows_the_mouse(camera):
         assert abs(place[1 - axis]) < 1e-12
 
 
+def test_a_frame_may_be_of_any_size():
+    camera, orbit = Camera(u=(1.2e308, 1.2e308, 0.0), w=(0.0, 0.0, 1e-300)), HOME.pulled(0, 60)
+    there = turned(camera, orbit, (0.0, 0.0, -4.0))
+    assert np.divide(there.u, 1e308) == pytest.approx((1.2, 1.2, 0))
+    usual = turned(Camera(u=(1.0, 1.0, 0.0)), orbit, (0.0, 0.0, -4.0))
+    assert there.eye == pytest.approx(usual.eye)
+    assert np.multiply(there.w, 1e300) == pytest.approx(usual.w)
+
+
 def test_the_file_says_what_is_up():
     """Sideways goes round v, however far down the mouse has been."""
     camera = Camera((1.0, 2.0, 3.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
@@ -160,6 +169,7 @@ def test_shapes_stay_in_sight_while_the_camera_goes_round():
         ("sphere 1 -1 0 -4\nsphere 1 1 0 -4", (0, 0, -4)),
         ("sphere 1 0 0 -4\nsphere 1e10 0 -1e10 0", (0, 0, -4)),  # a ground
         ("sphere 1 0 0 -4\nsphere 1e10 0 0 0", (0, 0, -4)),  # a sky about it all
+        ("sphere 1 0 0 -4\nsphere 50 0 0 -20", (0, 0, -4)),  # and one whose centre is ahead
         ("sphere 1 0 0 -4\nsphere 1 0 0 40\nsphere 1 40 0 -4", (0, 0, -4)),  # behind the eye, beside the picture
         ("sphere 1 0 0 5", (0, 0, -4)),  # nothing ahead: as far away as things are
         ("sphere 1 0 0 0", (0, 0, -1)),

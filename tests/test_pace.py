@@ -42,6 +42,14 @@ def test_it_settles_and_does_not_flicker(fixed, pixels):
     assert fixed + pixels / last**2 <= BUDGET or last == COARSENESS[-1]
 
 
+@pytest.mark.parametrize(("part", "coarse"), [(0.7, 1), (0.9, 2), (1.1, 2)])
+def test_finer_must_promise_to_be_fast_with_some_to_spare(part, coarse):
+    pace = Pace()
+    pace.took(1, 2 * BUDGET)
+    assert pace.choose() == 2
+    assert after(pace, 0, part * BUDGET)[-1] == coarse
+
+
 def test_it_gets_finer_again():
     pace = Pace()
     after(pace, 0, 1000)

@@ -283,6 +283,24 @@ def test_frames_that_are_fast_enough_are_drawn_once(renderer, scene, monkeypatch
     assert drawn == [SIZE, SIZE]
 
 
+def test_frames_that_get_slow_get_coarse(renderer, scene, monkeypatch):
+    """Also where the picture in full has never been drawn as slowly."""
+    request = Request(scene, "hit", SIZE)
+    answer(renderer, request)
+    monkeypatch.setattr(worker, "draw", slowly(0.2, []))
+    coarse = [answer(renderer, turned(request, right)).coarse for right in range(1, 12)]
+    assert coarse[-1] > 1
+
+
+def test_another_stage_has_another_pace(renderer, scene, monkeypatch):
+    request = Request(scene, "hit", SIZE)
+    answer(renderer, request)
+    answer(renderer, turned(request, 1))
+    monkeypatch.setattr(worker, "draw", slowly(0.2, []))
+    other = answer(renderer, Request(scene, "normal", SIZE))
+    assert answer(renderer, turned(other.request, 1)).coarse > 1
+
+
 def test_frames_are_seen_however_fast_the_mouse_is(renderer, scene, monkeypatch):
     """Giving up each frame for the next one would leave nothing to be seen."""
     monkeypatch.setattr(worker, "draw", slowly(1, []))
