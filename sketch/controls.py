@@ -1,4 +1,4 @@
-"""What each key does: the table KEYS, the View that a key changes, and `press`. Nothing here knows of a window."""
+"""What keys and the mouse do: the table KEYS, the View that they change, and how. Nothing here knows of a window."""
 
 from __future__ import annotations
 
@@ -9,20 +9,40 @@ from typing import NamedTuple
 
 from raytracer import METHODS, STAGES
 from raytracer.methods import CERTIFIED
+from sketch.orbit import HOME, Orbit
 
 SCENE_KEYS = "1234567890-"
+MOUSE = (
+    ("a click", "tells a pixel's story"),
+    ("dragging", "turns the camera about the scene"),
+    ("the wheel", "moves the camera, nearer or farther away"),
+)
+SLACK = 3  # pixels: a hand that trembles does not drag
+
+Place = tuple[int, int]  # column and row
+
+
+@dataclass(frozen=True)
+class Grip:
+    """Where the mouse has taken hold of the picture."""
+
+    at: Place
+    orbit: Orbit  # as it was there
+    pulls: bool = False  # whether the mouse has gone away from there, so that it is no click any more
 
 
 @dataclass(frozen=True)
 class View:
-    """What the user wants to see. A key press makes a new one of it."""
+    """What the user wants to see. A key or the mouse makes a new one of it."""
 
     scenes: tuple[Path, ...]  # of the folder, in the order in which keys count them
     place: int = 0  # which of them
     stage: str = "diffuse"
     method: str = CERTIFIED
     readings: int = 0  # how often the user has asked for the files to be read again
-    pixel: tuple[int, int] | None = None  # column and row whose story is told
+    orbit: Orbit = HOME  # where the scene is seen from
+    grip: Grip | None = None  # while a button is held down
+    pixel: Place | None = None  # whose story is told
     help: bool = False
     legend: bool = True  # of a stage that has one
     note: str = ""  # the answer to the last key
@@ -45,14 +65,14 @@ class Key(NamedTuple):
 def to_scene(view: View, key: str) -> View:
     place = SCENE_KEYS.index(key)
     if place < len(view.scenes):
-        return replace(view, place=place)
+        return _at_home(replace(view, place=place))
     return replace(view, note=f"there is no scene {place + 1}: the folder holds {len(view.scenes)}")
 
 
 def to_next_scene(view: View, key: str) -> View:
     """The scene after this one, or before it; beyond the last comes the first."""
     step = 1 if key == "]" else -1
-    return replace(view, place=(view.place + step) % len(view.scenes))
+    return _at_home(replace(view, place=(view.place + step) % len(view.scenes)))
 
 
 def to_stage(view: View, key: str) -> View:
@@ -68,6 +88,11 @@ def to_next_method(view: View, key: str) -> View:
     """The method after this one, or before it; beyond the last comes the first."""
     names, step = list(METHODS), 1 if key == "m" else -1
     return replace(view, method=names[(names.index(view.method) + step) % len(names)])
+
+
+def to_file_view(view: View, key: str) -> View:
+    note = "this is the file's own view" if view.orbit == HOME else ""
+    return _at_home(replace(view, note=note))
 
 
 def show_legend(view: View, key: str) -> View:
@@ -98,6 +123,7 @@ KEYS = (
     *(Key(stage.key, stage.key, f"{name}: {stage.about}", to_stage) for name, stage in STAGES.items()),
     Key("\t", "Tab", "the next stage", to_next_stage),
     Key("mM", "m", "the next method; M the one before", to_next_method),
+    Key("c", "c", "the file's own view again, after the mouse has changed it", to_file_view),
     Key("l", "l", "hide the legend, or show it", show_legend),
     Key("r", "r", "read the scene's file again", read_again),
     Key("s", "s", "save the picture as a PNG", save),
@@ -112,20 +138,59 @@ def press(view: View, key: str) -> View:
     if row is None:  # Shift alone is such a key too: it is not worth a word
         note = f"key {key} does nothing; ? shows the keys" if key.isprintable() else view.note
         return replace(view, note=note, wish="")
-    quiet = replace(view, pixel=None, help=False, note="", wish="")
-    after = row.act(quiet, key if key in row.keys else key.lower())
+    after = row.act(_bare(view), key if key in row.keys else key.lower())
     return replace(after, help=after.help and not view.help)
 
 
-def click(view: View, pixel: tuple[int, int]) -> View:
-    """The view after a click on a pixel, given as column and row."""
-    return replace(view, pixel=pixel, help=False, note="", wish="")
+def grip(view: View, at: Place) -> View:
+    """The view when the mouse takes hold of the picture: a click or a drag begins."""
+    return replace(view, grip=Grip(at, view.orbit), wish="")
+
+
+def drag(view: View, at: Place) -> View:
+    """The view when the mouse has gone there: the near side of the scene comes along."""
+    held = view.grip
+    if held is None:
+        return replace(view, wish="")
+    right, down = at[0] - held.at[0], at[1] - held.at[1]
+    if not held.pulls and max(abs(right), abs(down)) <= SLACK:
+        return replace(view, wish="")
+    orbit = replace(held.orbit.pulled(right, down), nearer=view.orbit.nearer)
+    return replace(_bare(view), orbit=orbit, grip=replace(held, pulls=True))
+
+
+def release(view: View) -> View:
+    """The view when the mouse lets go: if it has not pulled, that was a click."""
+    held = view.grip
+    if held is None or held.pulls:
+        return replace(view, grip=None, wish="")
+    return replace(click(view, held.at), grip=None)
+
+
+def wheel(view: View, notches: int) -> View:
+    """The view after so many notches of the wheel, away from the user."""
+    return replace(_bare(view), orbit=view.orbit.moved(notches))
+
+
+def click(view: View, pixel: Place) -> View:
+    """The view after a click on a pixel."""
+    return replace(_bare(view), pixel=pixel)
 
 
 def keys_as_markdown() -> str:
     """KEYS as the README shows them."""
     rows = [f"| {row.label} | {row.does} |" for row in KEYS]
     return "\n".join(["| key | what it does |", "|---|---|", *rows])
+
+
+def _bare(view: View) -> View:
+    """Without what the last key or click brought up over the picture."""
+    return replace(view, pixel=None, help=False, note="", wish="")
+
+
+def _at_home(view: View) -> View:
+    """From the file's own view; the mouse lets go, lest it drag the scene back."""
+    return replace(view, orbit=HOME, grip=None)
 
 
 def _find(key: str) -> Key | None:

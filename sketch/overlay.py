@@ -19,7 +19,7 @@ from PIL import Image, ImageDraw, ImageFont
 from raytracer import METHODS
 from raytracer.image import to_bytes
 from raytracer.methods import CERTIFIED
-from sketch.controls import KEYS, View
+from sketch.controls import KEYS, MOUSE, View
 from sketch.worker import Drawing
 
 SMALLEST = 320  # a smaller picture stands in the middle of a canvas of this side, so that text has room
@@ -77,27 +77,37 @@ class Panel:
 
 @dataclass(frozen=True)
 class Status:
-    """The two lines under the picture; of the first, the name is shortened where there is no room."""
+    """The two lines under the picture: name and figures, remark and path. The left ones are shortened for the right."""
 
     name: str
     figures: str
     remark: str
     colour: Colour = DIM  # of the remark
+    path: str = ""  # that drew the picture
 
 
-def status(view: View, drawing: Drawing | None, size: int) -> Status:
-    """What the two lines say; the first one: scene, stage, method unless it is the certain one, size, milliseconds."""
+def status(view: View, drawing: Drawing | None, size: int, frames_a_second: float | None = None) -> Status:
+    """What the two lines say; the first one: scene, stage, method unless it is the certain one, size, time."""
     if drawing is not None and not _answers(drawing, view):
         drawing = None
     if drawing is None or not (drawing.scene or drawing.error):
         time = "reading"
     elif drawing.error:
         time = "not drawn"
+    elif drawing.moving:
+        time = _pace(drawing, frames_a_second)
     else:
         time = f"{drawing.milliseconds:.1f} ms" if drawing.whole else f"drawing, {drawing.done:.0%}"
     how = view.stage if view.method == CERTIFIED else f"{view.stage} · {view.method}"
     figures = f"{view.place + 1} of {len(view.scenes)} · {how} · {size} × {size} · {time}"
-    return Status(view.scene.stem, figures, *_remark(view, drawing))
+    path = f"{drawing.path} path" if drawing is not None and drawing.path else ""
+    return Status(view.scene.stem, figures, *_remark(view, drawing), path)
+
+
+def _pace(drawing: Drawing, frames_a_second: float | None) -> str:
+    """How fast frames come while the camera moves, and what they cost in resolution."""
+    rate = "… fps" if frames_a_second is None else f"{frames_a_second:.0f} fps"
+    return rate if drawing.coarse == 1 else f"{rate}, 1/{drawing.coarse} size"
 
 
 def _answers(drawing: Drawing, view: View) -> bool:
@@ -119,7 +129,7 @@ def _remark(view: View, drawing: Drawing | None) -> tuple[str, Colour]:
 
 
 def help_panel() -> Panel:
-    return Panel("Keys", (*((row.label, row.does) for row in KEYS), ("a click", "tells a pixel's story")))
+    return Panel("Keys and mouse", (*((row.label, row.does) for row in KEYS), *MOUSE))
 
 
 def error_panel(path: Path, error: str) -> Panel:
@@ -138,13 +148,15 @@ def compose(
     panel: Panel | None = None,
     mark: tuple[int, int] | None = None,
     legend: Legend = (),
+    out: np.ndarray | None = None,
 ) -> np.ndarray:
-    """The whole window: uint8 (height, width, 3). `mark` is the pixel that the panel is about."""
-    frame = np.empty((layout.height, layout.width, 3), np.uint8)
-    frame[:] = BACKDROP
+    """The whole window: uint8 (height, width, 3), or `out` filled with it. `mark` is the panel's pixel."""
+    frame = np.empty((layout.height, layout.width, 3), np.uint8) if out is None else out
     canvas, corner = frame[: layout.side], layout.corner
-    canvas[corner : corner + layout.size, corner : corner + layout.size] = picture
-    frame[layout.side :] = _strip(layout.width, status)
+    if corner:
+        canvas[:] = BACKDROP
+    _put(canvas[corner : corner + layout.size, corner : corner + layout.size], picture)
+    _put(frame[layout.side :], _strip(layout.width, status))
     place = None if mark is None else (mark[0] + corner, mark[1] + corner)
     if place is not None:
         _frame_pixel(canvas, *place)
@@ -154,6 +166,12 @@ def compose(
     if panel is not None:
         _lay_over(canvas, panel, None if place is None else place[1])
     return frame
+
+
+def _put(place: np.ndarray, picture: np.ndarray) -> None:
+    """Copy colours, red first: where pixels are farther apart than colours, numpy is five times as fast that way."""
+    for colour in range(3):
+        place[..., colour] = picture[..., colour]
 
 
 def _frame_pixel(canvas: np.ndarray, x: int, y: int) -> None:
@@ -194,6 +212,8 @@ def _strip(width: int, status: Status) -> np.ndarray:
     name = shortened(status.name, size, room - _length(figures, size) - MARGIN)
     draw.text((MARGIN, 4), name, BRIGHT, font(size))
     draw.text((width - MARGIN, 4), figures, BRIGHT, font(size), anchor="ra")
+    draw.text((width - MARGIN, 26), status.path, DIM, font(12), anchor="ra")
+    room -= round(_length(status.path, 12)) + MARGIN
     small = next((s for s in (14, 13) if _length(status.remark, s) <= room), 12)
     draw.text((MARGIN, 25), shortened(status.remark, small, room), status.colour, font(small))
     return np.asarray(image)
@@ -202,7 +222,7 @@ def _strip(width: int, status: Status) -> np.ndarray:
 @lru_cache(maxsize=16)
 def _panel(panel: Panel, width: int, height: int) -> np.ndarray:
     """A panel in the largest type in which it fits; RGBA."""
-    for size in (16, 15, 14, 13, 12, 11, 10):
+    for size in (16, 15, 14, 13, 12, 11, 10, 9, 8):
         image = _typeset(panel, size, width)
         if image.height <= height:
             break

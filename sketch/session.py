@@ -1,4 +1,4 @@
-"""What goes on behind the window: keys and clicks change the View, the renderer follows it. No method waits."""
+"""What goes on behind the window: keys and the mouse change the View, the renderer follows it. No method waits."""
 
 from __future__ import annotations
 
@@ -15,7 +15,9 @@ from raytracer.methods import CERTIFIED
 from sketch import controls
 from sketch.controls import View
 from sketch.files import save_beside
+from sketch.orbit import seen_from
 from sketch.overlay import Layout, Legend, Panel, compose, error_panel, help_panel, status, story_panel
+from sketch.pace import FrameRate
 from sketch.worker import BLANK, Drawing, Renderer, Request
 
 _PATIENCE = 5.0  # seconds that the end waits for a picture to be saved
@@ -28,7 +30,9 @@ class Session:
         self.layout = Layout(size)
         self.changed: Callable[[], object] = lambda: None
         self._view = view
-        self._turn = threading.Lock()  # keys, clicks and chores change the view one after the other
+        self._composed: Drawing | None = None  # the last that was part of the content
+        self._frames = FrameRate()
+        self._turn = threading.Lock()  # keys, the mouse and chores change the view one after the other
         self._story: tuple[tuple[int, int], tuple[str, ...]] | None = None  # of which pixel, and its lines
         self._chores = ThreadPoolExecutor(1, "chores")  # what takes a moment and is not drawing
         self._failure: BaseException | None = None  # of a chore
@@ -47,19 +51,42 @@ class Session:
     def press(self, key: str) -> None:
         self._change(lambda view: controls.press(view, key))
 
-    def click(self, x: int, y: int) -> None:
-        """A click at a place of the window."""
+    def grip(self, x: int, y: int) -> None:
+        """The mouse takes hold at a place of the window."""
         pixel = self.layout.pixel(x, y)
         if pixel is not None:
-            self._change(lambda view: controls.click(view, pixel))
+            self._change(lambda view: controls.grip(view, pixel))
 
-    def content(self) -> np.ndarray:
-        """All that the window shows: uint8 (height, width, 3)."""
+    def drag(self, x: int, y: int) -> None:
+        """The mouse has gone to a place of the window, or of the screen beside it."""
+        corner = self.layout.corner
+        self._change(lambda view: controls.drag(view, (x - corner, y - corner)))
+
+    def release(self) -> None:
+        """The mouse lets go."""
+        self._change(controls.release)
+
+    def wheel(self, notches: int) -> None:
+        """The wheel turns, away from the user where notches are above 0."""
+        self._change(lambda view: controls.wheel(view, notches))
+
+    def content(self, out: np.ndarray | None = None) -> np.ndarray:
+        """All that the window shows: uint8 (height, width, 3), or `out` filled with it."""
         view, drawing, size = self._view, self._renderer.drawing, self.layout.size
+        self._count(drawing)
         picture = np.full((size, size, 3), BLANK, np.uint8) if drawing is None else drawing.picture
         panel = self._panel(view, drawing)
         legend = () if panel is not None else self._legend(view, drawing)
-        return compose(self.layout, picture, status(view, drawing, size), panel, view.pixel, legend)
+        lines = status(view, drawing, size, self._frames.a_second)
+        return compose(self.layout, picture, lines, panel, view.pixel, legend, out)
+
+    def _count(self, drawing: Drawing | None) -> None:
+        """Count the frames that are shown while the camera moves."""
+        if drawing is None or not drawing.moving:
+            self._frames.rest()
+        elif drawing is not self._composed:
+            self._frames.shown()
+        self._composed = drawing
 
     def was_shown(self) -> None:
         """The content has been shown: now there is time to get ready for what comes next."""
@@ -87,7 +114,7 @@ class Session:
         self.changed()
 
     def _request(self, view: View) -> Request:
-        return Request(view.scene, view.stage, self.layout.size, view.method, view.readings)
+        return Request(view.scene, view.stage, self.layout.size, view.method, view.readings, view.orbit)
 
     def _panel(self, view: View, drawing: Drawing | None) -> Panel | None:
         """What lies over the picture."""
@@ -141,10 +168,10 @@ class Session:
             if seen is None:
                 return "not saved: there is no picture"
             request = seen.request
-        if seen is not None and seen.whole and seen.request == request:
+        if seen is not None and seen.full and seen.request == request:
             picture = seen.picture
-        else:  # not finished, or given up for the next one
-            size, scene = request.size, interpreter(request.path)
+        else:  # not finished, given up for the next one, or coarse
+            size, scene = request.size, seen_from(interpreter(request.path), request.orbit)
             picture = render_scene(scene, request.stage, size, size, method=request.method)
         return f"saved {save_beside(_file_name(request), picture)}"
 

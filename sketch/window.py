@@ -1,8 +1,9 @@
-"""The window on py5: it shows a session's content and hands keys and clicks on.
+"""The window on py5: it shows a session's content and hands keys and the mouse on.
 
 Seen with py5 0.10: `redraw()` is forgotten when it comes during `draw`, so the sketch loops while there is something
-new and stops looping when it has shown it. An exception in a handler leaves a process that hangs, and Java's own way
-out takes a second, so the process ends itself.
+new and stops looping when it has shown it. `np_pixels` takes an array a few times as fast as an image that is made of
+one. An exception in a handler leaves a process that hangs, and Java's own way out takes a second, so the process ends
+itself.
 """
 
 from __future__ import annotations
@@ -35,13 +36,13 @@ def run_window(session: Session) -> NoReturn:
     window.leave(0)
 
 
-def guarded(handler: Callable[[Window], None]) -> Callable[[Window], None]:
+def guarded(handler: Callable[..., None]) -> Callable[..., None]:
     """A handler whose exception is reported and ends the process."""
 
     @wraps(handler)
-    def guard(window: Window) -> None:
+    def guard(window: Window, *event: object) -> None:
         try:
-            handler(window)
+            handler(window, *event)
         except Exception:
             traceback.print_exc()
             window.leave(1)
@@ -64,7 +65,8 @@ class Window(py5.Sketch):  # type: ignore[misc] # py5 has no types
     @guarded
     def setup(self) -> None:
         self.get_surface().set_title("raytracer")
-        self.shown = self.create_image(self.width, self.height, self.RGB)
+        self.load_np_pixels()
+        self.np_pixels[..., 0] = 255  # opaque; the colours follow
         self.session.changed = self.loop
 
     @guarded
@@ -72,8 +74,8 @@ class Window(py5.Sketch):  # type: ignore[misc] # py5 has no types
         self.no_loop()  # first: whoever has something new from here on makes it loop again
         if self.session.failure:
             raise self.session.failure
-        self.create_image_from_numpy(self.session.content(), "RGB", dst=self.shown)
-        self.image(self.shown, 0, 0)
+        self.session.content(out=self.np_pixels[..., 1:])
+        self.update_np_pixels()
         self.session.was_shown()
 
     @guarded
@@ -84,7 +86,21 @@ class Window(py5.Sketch):  # type: ignore[misc] # py5 has no types
 
     @guarded
     def mouse_pressed(self) -> None:
-        self.session.click(self.mouse_x, self.mouse_y)
+        if self.mouse_button == self.LEFT:
+            self.session.grip(self.mouse_x, self.mouse_y)
+
+    @guarded
+    def mouse_dragged(self) -> None:
+        self.session.drag(self.mouse_x, self.mouse_y)
+
+    @guarded
+    def mouse_released(self) -> None:
+        if self.mouse_button == self.LEFT:
+            self.session.release()
+
+    @guarded
+    def mouse_wheel(self, event: py5.Py5MouseEvent) -> None:
+        self.session.wheel(-event.get_count())
 
     @guarded
     def exiting(self) -> None:

@@ -1,4 +1,8 @@
-"""Drawing in the background: post a request, look at what has come of it whenever you like. The latest request wins."""
+"""Drawing in the background: post a request, look at what has come of it whenever you like. The latest request wins.
+
+While the camera moves, a frame is shown when it is finished, as coarse as it must be to keep pace; when the camera has
+come to rest, the picture is drawn in full.
+"""
 
 from __future__ import annotations
 
@@ -11,15 +15,19 @@ from pathlib import Path
 
 import numpy as np
 
-from raytracer import Cancelled, Scene, SceneError, backend, interpreter, make_plan
+from raytracer import Cancelled, Plan, Scene, SceneError, backend, interpreter, make_plan, plain
 from raytracer.image import to_bytes
 from raytracer.methods import CERTIFIED
 from raytracer.render import draw
+from raytracer.scene import Vector
 from raytracer.stages import FALSE_HIT, FALSE_MISS, WRONG_SHAPE
 from raytracer.trace import Eye
+from sketch.orbit import HOME, Orbit, pivot_of, seen_from
+from sketch.pace import COARSENESS, Pace, enlarged
 
 BLANK = 40  # the grey of pixels that nothing was drawn on yet
-_PATIENCE = 1 / 30  # seconds between two looks at a picture that grows
+REST = 0.12  # seconds without a movement until the camera is at rest
+_PATIENCE = 1 / 30  # seconds: between two looks at a picture that grows; for a frame, when the next one is wanted
 
 
 @dataclass(frozen=True)
@@ -31,6 +39,11 @@ class Request:
     size: int
     method: str = CERTIFIED
     readings: int = 0  # another number means that the file is to be read again
+    orbit: Orbit = HOME  # where the scene is seen from
+
+    def is_like(self, other: Request) -> bool:
+        """Whether it differs from the other one in nothing but where the scene is seen from."""
+        return replace(self, orbit=other.orbit) == other
 
 
 @dataclass(frozen=True)
@@ -39,8 +52,11 @@ class Drawing:
 
     request: Request
     picture: np.ndarray  # uint8 (size, size, 3)
-    scene: Scene | None = None  # None until the file is read, and when it cannot be
+    scene: Scene | None = None  # with the camera that is seen; None until the file is read, and when it cannot be
     done: float = 0.0  # the part of the picture that is drawn
+    moving: bool = False  # whether it is a frame of a movement
+    coarse: int = 1  # columns and rows that a pixel is drawn across
+    path: str = ""  # that drew it, see `path_of`
     milliseconds: float = 0.0  # that drawing took
     wrong: int | None = None  # pixels whose hit or shape is wrong; None where the stage does not tell
     warnings: tuple[str, ...] = ()
@@ -50,19 +66,27 @@ class Drawing:
     def whole(self) -> bool:
         return self.done == 1.0
 
+    @property
+    def full(self) -> bool:
+        return self.whole and self.coarse == 1
+
 
 class Renderer:
     """A thread that draws what is asked for. `changed` is called on that thread whenever there is more to see."""
 
     def __init__(self, changed: Callable[[], object]) -> None:
         self.drawing: Drawing | None = None  # the latest
-        self.whole: Drawing | None = None  # the last one that was finished
+        self.whole: Drawing | None = None  # the last one that was finished, a frame or a picture
         self.failure: BaseException | None = None  # a mistake of this program, not of a scene's author: end it
         self._changed = changed
         self._wanted: Request | None = None
         self._closed = False
         self._news = threading.Condition()
+        self._last: Request | None = None  # that was taken up
+        self._moving = False  # whether that is a frame
+        self._pace = Pace()
         self._read: tuple[Path, int, Scene] | None = None
+        self._pivot: Vector | None = None  # of that scene, once it is turned about
         self._thread = threading.Thread(target=self._work, name="renderer", daemon=True)
         self._thread.start()
         self._loader = threading.Thread(target=self._load, name="loader", daemon=True)
@@ -105,15 +129,29 @@ class Renderer:
             self._changed()
 
     def _next(self) -> Request | None:
+        """The next request; when the camera has come to rest, the last one once more; None at the end."""
         with self._news:
-            self._news.wait_for(lambda: self._closed or self._wanted is not None)
-            request, self._wanted = self._wanted, None
-            return None if self._closed else request
+            self._news.wait_for(lambda: self._closed or self._wanted is not None, REST if self._moving else None)
+            if self._closed:
+                return None
+            last, wanted, self._wanted = self._last, self._wanted, None
+            if wanted is None:  # it has come to rest
+                self._moving = False
+                return last
+            same = last is not None and wanted.is_like(last)
+            self._moving = same and wanted != last
+            self._pace = self._pace if same else Pace()
+            self._last = wanted
+            return wanted
 
     def _answer(self, request: Request) -> None:
-        self.drawing = Drawing(request, self._canvas(request.size))
         try:
-            self._draw(self.drawing)
+            if self._moving:
+                self._draw_frame(request)
+            elif self._shows(request):
+                self._come_to_rest()
+            else:
+                self._draw_picture(request)
         except Cancelled:
             return
         except (SceneError, OSError, MemoryError) as error:
@@ -121,12 +159,41 @@ class Renderer:
             self.drawing = Drawing(request, self._canvas(request.size), error=message)
         self._changed()
 
-    def _draw(self, drawing: Drawing) -> None:
-        request, looked = drawing.request, time.perf_counter()
-        scene = self._scene(request)
-        start = time.perf_counter()
+    def _draw_frame(self, request: Request) -> None:
+        """One frame of a movement. Frames are finished, lest none is ever seen, but for one that takes too long."""
+        scene, coarse = self._scene(request), self._pace.choose()
+        size, start = -(-request.size // coarse), time.perf_counter()
+
+        def given_up() -> bool:
+            late = coarse < COARSENESS[-1] and time.perf_counter() - start > _PATIENCE
+            wanted = self._wanted
+            return self._closed or (wanted is not None and (late or not wanted.is_like(request)))
+
+        try:
+            plan = make_plan(scene, request.stage, size, size, method=request.method)
+            picture = enlarged(draw(plan, cancelled=given_up), request.size)
+        finally:
+            elapsed = 1000 * (time.perf_counter() - start)
+            self._pace.took(coarse, elapsed)
+        frame = Drawing(request, picture, scene, 1.0, True, coarse, path_of(plan), elapsed, warnings=plan.warnings)
+        self.drawing = self.whole = frame
+
+    def _shows(self, request: Request) -> bool:
+        """Whether the request's picture is there already: as the last frame, in full."""
+        return self.drawing is not None and self.drawing.full and self.drawing.request is request
+
+    def _come_to_rest(self) -> None:
+        assert self.drawing is not None
+        drawing = self.drawing
+        self.drawing = self.whole = replace(drawing, moving=False, wrong=_wrong(drawing.request, drawing.picture))
+
+    def _draw_picture(self, request: Request) -> None:
+        """The picture in full, seen as it grows."""
+        self.drawing = drawing = Drawing(request, self._canvas(request.size))
+        scene, looked = self._scene(request), time.perf_counter()
+        start = looked
         plan = make_plan(scene, request.stage, request.size, request.size, method=request.method)
-        self.drawing = drawing = replace(drawing, scene=scene, warnings=plan.warnings)
+        self.drawing = drawing = replace(drawing, scene=scene, warnings=plan.warnings, path=path_of(plan))
 
         def progress(done: int, total: int, rows: slice) -> None:
             nonlocal looked
@@ -138,18 +205,22 @@ class Renderer:
 
         draw(plan, out=drawing.picture, progress=progress, cancelled=self._superseded)
         elapsed = 1000 * (time.perf_counter() - start)
-        wrong = _count_wrong(drawing.picture) if request.stage == "error" else None
+        self._pace.took(1, elapsed)
+        wrong = _wrong(request, drawing.picture)
         self.drawing = self.whole = replace(drawing, done=1.0, milliseconds=elapsed, wrong=wrong)
 
     def _superseded(self) -> bool:
         return self._closed or self._wanted is not None
 
     def _scene(self, request: Request) -> Scene:
-        """The request's scene; its file is read only when it is another one, or when that is asked for."""
+        """The request's scene, as it is seen; its file is read only when it is another one, or when asked for."""
         if self._read is None or self._read[:2] != (request.path, request.readings):
-            self._read = None
+            self._read, self._pivot = None, None
             self._read = request.path, request.readings, interpreter(request.path)
-        return self._read[2]
+        scene = self._read[2]
+        if request.orbit != HOME and self._pivot is None:
+            self._pivot = pivot_of(scene)
+        return seen_from(scene, request.orbit, self._pivot)
 
     def _canvas(self, size: int) -> np.ndarray:
         if self.whole is not None and self.whole.request.size == size:
@@ -178,8 +249,16 @@ def bring_in_kernels(seen: Drawing) -> bool:
     return True
 
 
-def _count_wrong(picture: np.ndarray) -> int:
-    """How many pixels of a picture at stage `error` have a colour that says wrong."""
+def path_of(plan: Plan) -> str:
+    """Which path draws a plan: "numpy" or "compiled"."""
+    known: str | None = getattr(plan, "path_name", None)
+    return known or ("numpy" if plan.eye.targets.path is plain else "compiled")
+
+
+def _wrong(request: Request, picture: np.ndarray) -> int | None:
+    """How many pixels of a picture at stage `error` have a colour that says wrong; None for another stage."""
+    if request.stage != "error":
+        return None
     return sum(
         int(np.logical_and.reduce([picture[..., k] == byte for k, byte in enumerate(to_bytes(np.array(colour)))]).sum())
         for colour in (WRONG_SHAPE, FALSE_HIT, FALSE_MISS)

@@ -1,4 +1,4 @@
-"""Keys change the View, and nothing else does; no window is needed to try them all."""
+"""Keys and the mouse change the View, and nothing else does; no window is needed to try them all."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from raytracer import METHODS, STAGES
-from sketch.controls import KEYS, SCENE_KEYS, View, click, keys_as_markdown, press
+from sketch.controls import KEYS, SCENE_KEYS, SLACK, View, click, drag, grip, keys_as_markdown, press, release, wheel
+from sketch.orbit import FARTHEST, HOME, Orbit
 
 SCENES = tuple(Path(f"{n:02}.cli") for n in range(1, 15))
 VIEW = View(SCENES)
@@ -129,11 +130,90 @@ def test_a_click_names_a_pixel_and_a_key_forgets_it():
     assert press(click(VIEW, (3, 4)), "n").pixel is None
 
 
-@given(st.integers(1, 14), st.lists(st.one_of(st.sampled_from(ALL_KEYS), st.characters())))
-def test_any_sequence_of_keys_leaves_a_valid_view(number, keys):
+def dragged(view: View, *places: tuple[int, int]) -> View:
+    """After the mouse has taken hold at the first place, gone to the others and let go."""
+    view = grip(view, places[0])
+    for place in places[1:]:
+        view = drag(view, place)
+    return release(view)
+
+
+def test_dragging_turns_the_camera_by_the_way_of_the_mouse():
+    assert dragged(VIEW, (100, 100), (107, 90)).orbit == HOME.pulled(7, -10)
+    assert dragged(VIEW, (100, 100), (50, 60), (107, 90)).orbit == HOME.pulled(7, -10)
+    twice = dragged(dragged(VIEW, (100, 100), (107, 90)), (0, 0), (0, 20))
+    assert twice.orbit == HOME.pulled(7, 10)
+    assert twice.grip is None
+    assert drag(VIEW, (5, 5)) == VIEW  # the mouse holds nothing
+
+
+def test_dragging_there_and_back_is_no_click():
+    back = dragged(VIEW, (100, 100), (300, 40), (100, 100))
+    assert back == VIEW
+    assert back.pixel is None
+
+
+def test_a_hand_that_trembles_clicks():
+    trembled = dragged(VIEW, (100, 100), (100 + SLACK, 100 - SLACK))
+    assert trembled == click(VIEW, (100, 100))
+    assert dragged(VIEW, (100, 100), (100, 100 + SLACK + 1)).pixel is None
+    assert release(VIEW) == VIEW
+
+
+def test_dragging_and_the_wheel_take_away_what_lies_over_the_picture():
+    for over in (press(VIEW, "?"), click(VIEW, (3, 4)), press(VIEW, "q"), press(VIEW, "s")):
+        for after in (dragged(over, (0, 0), (50, 0)), wheel(over, 1)):
+            assert (after.pixel, after.help, after.note, after.wish) == (None, False, "", "")
+    assert grip(press(VIEW, "?"), (0, 0)).help  # not before it is known whether it is a drag
+    saved = press(VIEW, "s")
+    for after in (grip(saved, (0, 0)), drag(saved, (0, 0)), release(saved), click(saved, (0, 0)), wheel(saved, 1)):
+        assert after.wish == ""
+
+
+def test_the_wheel_counts_notches_also_during_a_drag():
+    assert wheel(wheel(VIEW, 2), -3).orbit == Orbit(nearer=-1)
+    assert wheel(VIEW, 10**6).orbit == Orbit(nearer=FARTHEST)
+    during = drag(wheel(drag(grip(VIEW, (0, 0)), (9, 0)), 2), (20, 0))
+    assert during.orbit == Orbit(right=20, nearer=2)
+
+
+def test_c_returns_to_the_files_own_view_and_says_so_if_it_is_there():
+    moved = wheel(dragged(VIEW, (0, 0), (50, 60)), 4)
+    assert press(moved, "c") == VIEW
+    assert press(VIEW, "c").note == "this is the file's own view"
+    assert press(drag(grip(VIEW, (0, 0)), (50, 60)), "c") == VIEW
+
+
+@pytest.mark.parametrize("key", ["1", "2", "]", "["])
+def test_a_scene_is_first_seen_as_its_file_says(key):
+    held = drag(grip(VIEW, (0, 0)), (50, 60))
+    after = press(held, key)
+    assert after.orbit == HOME
+    assert drag(after, (90, 90)).orbit == HOME  # the mouse has let go of the scene before
+
+
+@pytest.mark.parametrize("key", ["n", "\t", "m", "r", "s", "?", "9"])
+def test_other_keys_leave_the_camera(key):
+    moved = wheel(dragged(VIEW, (0, 0), (50, 60)), 4)
+    assert press(replace(moved, scenes=SCENES[:4]), key).orbit == moved.orbit
+
+
+places = st.tuples(st.integers(-500, 500), st.integers(-500, 500))
+steps = st.one_of(
+    st.sampled_from(ALL_KEYS).map(lambda key: lambda view: press(view, key)),
+    st.characters().map(lambda key: lambda view: press(view, key)),
+    places.map(lambda place: lambda view: grip(view, place)),
+    places.map(lambda place: lambda view: drag(view, place)),
+    st.just(release),
+    st.integers(-20, 20).map(lambda notches: lambda view: wheel(view, notches)),
+)
+
+
+@given(st.integers(1, 14), st.lists(steps))
+def test_any_sequence_of_keys_and_the_mouse_leaves_a_valid_view(number, some):
     view = View(SCENES[:number])
-    for key in keys:
-        view = press(view, key)
+    for step in some:
+        view = step(view)
         assert is_valid(view)
 
 

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
+from itertools import cycle
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +14,7 @@ import pytest
 
 from raytracer import METHODS, STAGES, eye_hits, interpreter, load_png, probe_pixel, render_scene
 from sketch.controls import View
+from sketch.orbit import HOME, Orbit, seen_from
 from sketch.overlay import MARGIN, SMALLEST, STRIP, Layout, Panel, Status, _length, compose, help_panel, status
 from sketch.session import Session
 from sketch.worker import Drawing, Request
@@ -44,12 +48,17 @@ def wait_until(happened: Callable[[], object]) -> None:
         time.sleep(0.005)
 
 
-def expected(path: Path, stage: str = "diffuse", method: str = "certified") -> np.ndarray:
-    return render_scene(interpreter(path), stage, SIZE, SIZE, method=method)
+def expected(path: Path, stage: str = "diffuse", method: str = "certified", orbit: Orbit = HOME) -> np.ndarray:
+    return render_scene(seen_from(interpreter(path), orbit), stage, SIZE, SIZE, method=method)
 
 
 def shows(session: Session, picture: np.ndarray) -> bool:
     return np.array_equal(session.content()[:SIZE, :SIZE], picture)
+
+
+def click(session: Session, x: int, y: int) -> None:
+    session.grip(x, y)
+    session.release()
 
 
 def test_keys_change_what_is_seen(session, scenes):
@@ -179,11 +188,11 @@ def test_a_folder_that_cannot_be_written_is_a_note(session, scenes, monkeypatch)
 
 def test_a_click_prints_the_story(session, scenes, capsys):
     wait_until(lambda: shows(session, expected(scenes[0])))
-    session.click(SIZE // 2, SIZE // 2)
+    click(session, SIZE // 2, SIZE // 2)
     session.close()
     assert f"pixel {SIZE // 2} {SIZE // 2}" in capsys.readouterr().out
     assert not shows(session, expected(scenes[0]))
-    session.click(SIZE // 2, SIZE + 5)  # on the status: nothing
+    click(session, SIZE // 2, SIZE + 5)  # on the status: nothing
     assert session._view.pixel == (SIZE // 2, SIZE // 2)
 
 
@@ -192,11 +201,130 @@ def test_a_click_tells_what_the_method_found(scenes, capsys):
     y, x = map(int, np.argwhere((found >= 0) & (true < 0))[0])
     session = Session(View((FAR,), method="textbook"), SIZE)
     wait_until(lambda: session._renderer.whole)
-    session.click(x, y)
+    click(session, x, y)
     session.close()
     story = probe_pixel(interpreter(FAR), x, y, SIZE, SIZE, method="textbook").story()
     assert capsys.readouterr().out.splitlines() == story
     assert story != probe_pixel(interpreter(FAR), x, y, SIZE, SIZE).story()
+
+
+def drag(session: Session, right: int, down: int) -> None:
+    session.grip(100, 100)
+    for part in (0.3, 0.6, 1):
+        session.drag(100 + round(right * part), 100 + round(down * part))
+    session.release()
+
+
+def test_dragging_and_the_wheel_show_the_scene_from_elsewhere_and_c_from_home(session, scenes):
+    wait_until(lambda: shows(session, expected(scenes[0])))
+    drag(session, 40, -30)
+    wait_until(lambda: shows(session, expected(scenes[0], orbit=HOME.pulled(40, -30))))
+    session.wheel(3)
+    orbit = HOME.pulled(40, -30).moved(3)
+    wait_until(lambda: shows(session, expected(scenes[0], orbit=orbit)))
+    session.press("n")
+    wait_until(lambda: shows(session, expected(scenes[0], "normal", orbit=orbit)))
+    session.press("c")
+    wait_until(lambda: shows(session, expected(scenes[0], "normal")))
+
+
+def test_another_scene_is_seen_as_its_file_says(session, scenes):
+    drag(session, 40, -30)
+    session.press("2")
+    wait_until(lambda: shows(session, expected(scenes[1])))
+    session.press("1")
+    wait_until(lambda: shows(session, expected(scenes[0])))
+
+
+def test_a_drag_tells_no_story_and_a_drag_beside_the_picture_does_nothing(session, capsys):
+    drag(session, 40, -30)
+    session.grip(SIZE // 2, SIZE + 5)  # on the status
+    session.drag(50, 50)
+    session.release()
+    wait_until(lambda: is_answered(session))
+    assert session._view.orbit == HOME.pulled(40, -30)
+    session.close()
+    assert capsys.readouterr().out == ""
+
+
+def test_the_story_is_of_what_is_seen(session, scenes, capsys):
+    session.wheel(-12)
+    wait_until(lambda: is_answered(session))
+    click(session, SIZE // 2, SIZE // 2)
+    session.close()
+    seen = seen_from(interpreter(scenes[0]), HOME.moved(-12))
+    assert capsys.readouterr().out.splitlines() == probe_pixel(seen, SIZE // 2, SIZE // 2, SIZE, SIZE).story()
+
+
+def test_s_saves_what_is_seen_moving_or_not(session, scenes, tmp_path):
+    wait_until(lambda: is_answered(session))
+    drag(session, 40, -30)
+    session.press("s")
+    wait_until(lambda: (tmp_path / "1-diffuse.png").exists())
+    wait_until(lambda: is_answered(session))
+    session.press("s")
+    session.close()
+    for name in ("1-diffuse.png", "1-diffuse-2.png"):
+        assert np.array_equal(load_png(tmp_path / name), expected(scenes[0], orbit=HOME.pulled(40, -30)))
+
+
+def test_a_coarse_frame_is_saved_in_full(session, scenes, tmp_path, monkeypatch):
+    wait_until(lambda: is_answered(session))
+    monkeypatch.setattr("sketch.worker.REST", 1000)
+    monkeypatch.setattr(session._renderer._pace, "choose", lambda: 8)
+    drag(session, 40, -30)
+    orbit = HOME.pulled(40, -30)
+    wait_until(lambda: session._renderer.drawing.request.orbit == orbit)
+    assert session._renderer.drawing.coarse == 8
+    session.press("s")
+    session.close()
+    assert np.array_equal(load_png(tmp_path / "1-diffuse.png"), expected(scenes[0], orbit=orbit))
+
+
+def test_the_status_says_frames_a_second_while_moving_and_milliseconds_at_rest(session):
+    wait_until(lambda: is_answered(session))
+    way = cycle([10, -10])
+
+    def says_frames_a_second() -> bool:
+        drag(session, next(way), 0)
+        session.content()
+        figures = status(session._view, session._renderer.drawing, SIZE, session._frames.a_second).figures
+        return re.search(r" · \d+ fps(, 1/[248] size)?$", figures) is not None
+
+    wait_until(says_frames_a_second)
+    wait_until(lambda: is_answered(session) and not session._renderer.drawing.moving)
+    session.content()
+    assert session._frames.a_second is None
+    assert status(session._view, session._renderer.drawing, SIZE).figures.endswith(" ms")
+
+
+@pytest.mark.parametrize(
+    ("coarse", "rate", "said"), [(1, 59.7, "60 fps"), (2, 58.0, "58 fps, 1/2 size"), (8, None, "… fps, 1/8 size")]
+)
+def test_the_status_of_a_frame(coarse, rate, said):
+    picture = np.zeros((SMALLEST, SMALLEST, 3), np.uint8)
+    request = Request(FAR, "hit", SMALLEST)
+    frame = Drawing(request, picture, interpreter(FAR), 1.0, moving=True, coarse=coarse, path="compiled")
+    lines = status(View((FAR,), stage="hit"), frame, SMALLEST, rate)
+    assert lines.figures == f"1 of 1 · hit · 320 × 320 · {said}"
+    assert lines.path == "compiled path"
+
+
+def test_only_new_frames_count(session):
+    wait_until(lambda: is_answered(session))
+    session._renderer.drawing = replace(session._renderer.drawing, moving=True)
+    for _ in range(5):
+        session.content()
+    assert session._frames.a_second is None
+
+
+def test_the_content_can_be_put_into_a_windows_pixels(session, scenes):
+    wait_until(lambda: shows(session, expected(scenes[0])))
+    session.press("?")
+    pixels = np.full((session.layout.height, session.layout.width, 4), 7, np.uint8)
+    session.content(out=pixels[..., 1:])
+    assert np.array_equal(pixels[..., 1:], session.content())
+    assert (pixels[..., 0] == 7).all()
 
 
 @pytest.mark.parametrize("size", [1, 100, 320, 400])

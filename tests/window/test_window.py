@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from window_driver import PROJECT, Sketch
 
-from raytracer import METHODS, STAGES, interpreter, load_png, render_scene, save_png
+from raytracer import METHODS, STAGES, interpreter, load_png, probe_pixel, render_scene, save_png
+from sketch.orbit import HALF_TURN, HOME, Orbit, seen_from
 from sketch.overlay import Layout, Status, compose
 
 SIZE = 330
@@ -38,8 +39,11 @@ def sketch(lasting_display: str, folder: Path, tmp_path_factory: pytest.TempPath
 
 
 @pytest.fixture(scope="module")
-def expected(folder: Path) -> Callable[[str, str], np.ndarray]:
-    return lambda name, stage: render_scene(interpreter(folder / f"{name}.cli"), stage, SIZE, SIZE)
+def expected(folder: Path) -> Callable[..., np.ndarray]:
+    def draw(name: str, stage: str, orbit: Orbit = HOME) -> np.ndarray:
+        return render_scene(seen_from(interpreter(folder / f"{name}.cli"), orbit), stage, SIZE, SIZE)
+
+    return draw
 
 
 def test_the_first_picture_is_there_before_any_key(sketch, expected):
@@ -121,6 +125,55 @@ def test_a_click_tells_the_pixels_story_and_a_key_hides_it(sketch, expected):
     sketch.wait_until(lambda: "pixel 10 320" in sketch.stdout.read_text(), "another story")
     sketch.press("d")
     sketch.wait_for_picture(picture, "the picture without the story")
+
+
+def test_dragging_turns_the_camera_and_c_returns(sketch, expected):
+    sketch.press("3", "n")
+    sketch.wait_for_picture(expected(NAMES[2], "normal"), "a picture")
+    told = sketch.stdout.read_text()
+    sketch.drag(80, -40)
+    sketch.wait_for_picture(expected(NAMES[2], "normal", HOME.pulled(80, -40)), "the scene from elsewhere")
+    sketch.drag(-200, 100)
+    sketch.wait_for_picture(expected(NAMES[2], "normal", HOME.pulled(-120, 60)), "a second drag, out of the window")
+    sketch.press("c")
+    sketch.wait_for_picture(expected(NAMES[2], "normal"), "the file's own view")
+    assert sketch.stdout.read_text() == told  # a drag is no click
+
+
+def test_a_drag_that_is_held_is_drawn_in_full_and_goes_on(sketch, expected):
+    sketch.press("3", "n")
+    sketch.wait_for_picture(expected(NAMES[2], "normal"), "a picture")
+    sketch.drag(40, 40, release=False)
+    sketch.wait_for_picture(expected(NAMES[2], "normal", HOME.pulled(40, 40)), "the scene while the button is down")
+    sketch.xdotool("mousemove_relative", "--", "-40", "-40")
+    sketch.wait_for_picture(expected(NAMES[2], "normal"), "the way back")
+    sketch.release()
+    sketch.press("c")
+
+
+def test_the_wheel_moves_the_camera(sketch, expected):
+    sketch.press("3", "d")
+    sketch.wait_for_picture(expected(NAMES[2], "diffuse"), "a picture")
+    sketch.wheel(5)
+    sketch.wait_for_picture(expected(NAMES[2], "diffuse", HOME.moved(5)), "the scene from nearer")
+    sketch.wheel(-9)
+    sketch.wait_for_picture(expected(NAMES[2], "diffuse", HOME.moved(-4)), "the scene from farther away")
+    sketch.press("1")
+    sketch.wait_for_picture(expected(NAMES[0], "diffuse"), "another scene as its file says")
+    sketch.press("3")
+    sketch.wait_for_picture(expected(NAMES[2], "diffuse"), "the scene as its file says")
+
+
+def test_a_click_after_a_drag_tells_what_is_seen(sketch, folder, expected):
+    sketch.press("1", "d")
+    sketch.wait_for_picture(expected(NAMES[0], "diffuse"), "a picture")
+    sketch.drag(HALF_TURN // 4, 0)
+    orbit = HOME.pulled(HALF_TURN // 4, 0)
+    sketch.wait_for_picture(expected(NAMES[0], "diffuse", orbit), "the scene from elsewhere")
+    sketch.click(150, 140)
+    story = probe_pixel(seen_from(interpreter(folder / f"{NAMES[0]}.cli"), orbit), 150, 140, SIZE, SIZE).story()
+    sketch.wait_until(lambda: "\n".join(story) in sketch.stdout.read_text(), "the story of what is seen")
+    sketch.press("c")
 
 
 def test_a_broken_scene_leaves_the_last_picture_under_a_message(sketch, expected):
@@ -208,7 +261,10 @@ def test_quitting_does_not_wait_for_the_compiler(start, folder):
     assert sketch.stderr.read_text() == ""
 
 
-@pytest.mark.parametrize("method", ["sketch.session.Session.press", "sketch.session.probe_pixel"])
+MISTAKES = ["Session.press", "Session.drag", "Session.wheel", "probe_pixel"]
+
+
+@pytest.mark.parametrize("method", [f"sketch.session.{name}" for name in MISTAKES])
 def test_a_mistake_of_ours_ends_the_sketch_with_status_1(start, folder, method):
     """In a handler, and on the thread of the chores."""
     owner, name = method.rsplit(".", 1)
@@ -219,9 +275,13 @@ def test_a_mistake_of_ours_ends_the_sketch_with_status_1(start, folder, method):
         "sys.exit(sketch.__main__.main())"
     )
     sketch = start(folder, "--size", 100, program=("-c", sabotage))
-    sketch.press("d")
-    if name == "probe_pixel":
-        sketch.click(sketch.width // 2, sketch.width // 2)
+    use = {
+        "press": lambda: sketch.press("d"),
+        "drag": lambda: sketch.drag(20, 20),
+        "wheel": lambda: sketch.wheel(1),
+        "probe_pixel": lambda: sketch.click(sketch.width // 2, sketch.width // 2),
+    }
+    use[name]()
     assert sketch.end() == 1
     assert "ZeroDivisionError: sabotage" in sketch.stderr.read_text()
 

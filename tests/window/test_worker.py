@@ -6,6 +6,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from types import SimpleNamespace
@@ -14,7 +15,10 @@ import numpy as np
 import pytest
 
 from raytracer import METHODS, Cancelled, backend, eye_hits, interpreter, render_scene
-from sketch import worker
+from raytracer.render import draw
+from sketch import pace, worker
+from sketch.orbit import HOME, seen_from
+from sketch.pace import enlarged
 from sketch.worker import Drawing, Renderer, Request
 
 SPHERE = "surface 1 0 0  0 0 0  0 0 0  1 0\nlight 0 5 5  1 1 1\nsphere 1 0 0 -4\n"
@@ -45,10 +49,13 @@ def wait_until(happened: Callable[[], object]) -> None:
 
 
 def answer(renderer: Renderer, request: Request) -> Drawing:
+    """What comes of a request at first; a frame is drawn once more when nothing follows it."""
     renderer.post(request)
-    wait_until(lambda: renderer.drawing and renderer.drawing.request == request and is_over(renderer.drawing))
-    assert renderer.drawing is not None
-    return renderer.drawing
+    end = time.monotonic() + 10
+    while (drawing := renderer.drawing) is None or drawing.request != request or not is_over(drawing):
+        assert time.monotonic() < end
+        time.sleep(0.002)
+    return drawing
 
 
 def is_over(drawing: Drawing) -> bool:
@@ -202,3 +209,149 @@ def test_closing_ends_the_thread(renderer):
     renderer.close()
     renderer.join(10)
     assert not renderer._thread.is_alive()
+
+
+def turned(request: Request, right: int) -> Request:
+    return replace(request, orbit=HOME.pulled(right, 10))
+
+
+def expected(request: Request) -> np.ndarray:
+    scene = seen_from(interpreter(request.path), request.orbit)
+    return render_scene(scene, request.stage, request.size, request.size, method=request.method)
+
+
+def slowly(seconds: float) -> Callable[..., np.ndarray]:
+    """Drawing that takes so long for a picture in full, and less for fewer pixels."""
+
+    def draw_slowly(plan, **more):
+        end = time.monotonic() + seconds * (plan.raster.width / SIZE) ** 2
+        while time.monotonic() < end:
+            time.sleep(0.001)
+            if more["cancelled"]():
+                raise Cancelled
+        return draw(plan, **more)
+
+    return draw_slowly
+
+
+@pytest.mark.parametrize("stage", ["diffuse", "error"])
+def test_at_rest_the_picture_is_what_render_scene_draws_with_that_camera(renderer, scene, stage):
+    request = Request(scene, stage, SIZE)
+    answer(renderer, request)
+    for right in (3, 6, 9):
+        renderer.post(turned(request, right))
+    last = turned(request, 9)
+    wait_until(lambda: renderer.drawing.request == last and renderer.drawing.full and not renderer.drawing.moving)
+    drawing = renderer.drawing
+    assert np.array_equal(drawing.picture, expected(last))
+    assert stage == "error" or not np.array_equal(drawing.picture, expected(request))
+    assert drawing.scene == seen_from(interpreter(scene), last.orbit)
+    assert drawing.wrong == (0 if stage == "error" else None)
+    assert renderer.whole is drawing
+
+
+def test_home_again_is_the_files_own_scene(renderer, scene):
+    first = answer(renderer, Request(scene, "diffuse", SIZE))
+    answer(renderer, turned(first.request, 5))
+    assert answer(renderer, first.request).scene is first.scene
+
+
+def test_while_it_moves_it_is_coarse_and_at_rest_in_full(renderer, scene, monkeypatch):
+    monkeypatch.setattr(worker, "draw", slowly(0.2))
+    request = Request(scene, "normal", SIZE)
+    answer(renderer, request)
+    frames = [answer(renderer, turned(request, right)) for right in range(1, 6)]
+    for frame in frames:
+        assert frame.moving
+        assert frame.coarse > 1
+        small = -(-SIZE // frame.coarse)
+        assert np.array_equal(frame.picture, enlarged(expected(replace(frame.request, size=small)), SIZE))
+        assert not frame.full
+    wait_until(lambda: renderer.drawing.full)
+    assert not renderer.drawing.moving
+    assert np.array_equal(renderer.drawing.picture, expected(frames[-1].request))
+
+
+def test_frames_that_are_fast_enough_are_drawn_once(renderer, scene, monkeypatch):
+    monkeypatch.setattr(pace, "BUDGET", np.inf)
+    request = Request(scene, "hit", SIZE)
+    answer(renderer, request)
+    frame = answer(renderer, turned(request, 1))
+    wait_until(lambda: not renderer.drawing.moving)
+    assert renderer.drawing.picture is frame.picture
+
+
+def test_frames_that_get_slow_get_coarse(renderer, scene, monkeypatch):
+    """Also where the picture in full has never been drawn as slowly."""
+    request = Request(scene, "hit", SIZE)
+    answer(renderer, request)
+    monkeypatch.setattr(worker, "draw", slowly(0.2))
+    coarse = [answer(renderer, turned(request, right)).coarse for right in range(1, 12)]
+    assert coarse[-1] > 1
+
+
+def test_another_stage_has_another_pace(renderer, scene, monkeypatch):
+    request = Request(scene, "hit", SIZE)
+    answer(renderer, request)
+    answer(renderer, turned(request, 1))
+    monkeypatch.setattr(worker, "draw", slowly(0.2))
+    other = answer(renderer, Request(scene, "normal", SIZE))
+    assert answer(renderer, turned(other.request, 1)).coarse > 1
+
+
+def test_frames_are_seen_however_fast_the_mouse_is(renderer, scene, monkeypatch):
+    """Giving up each frame for the next one would leave nothing to be seen."""
+    monkeypatch.setattr(worker, "draw", slowly(1))
+    request, seen = Request(scene, "hit", SIZE), set()
+    answer(renderer, replace(request, readings=1))
+    end, right = time.monotonic() + 10, 0
+    while len(seen) < 5:
+        assert time.monotonic() < end
+        right += 1
+        renderer.post(turned(replace(request, readings=1), right))
+        time.sleep(0.002)
+        if renderer.drawing.moving:
+            seen.add(renderer.drawing.request.orbit)
+
+
+def test_another_stage_does_not_wait_for_a_frame(renderer, scene, monkeypatch):
+    started = threading.Event()
+
+    def draw_for_ever(plan, cancelled, out=None, **more):
+        started.set()
+        while not cancelled():
+            time.sleep(0.001)
+        raise Cancelled
+
+    request = Request(scene, "hit", SIZE)
+    answer(renderer, request)
+    with monkeypatch.context() as patch:
+        patch.setattr(worker, "draw", draw_for_ever)
+        renderer.post(turned(request, 1))
+        assert started.wait(10)
+    other = answer(renderer, replace(turned(request, 1), stage="normal"))
+    assert not other.moving
+    assert np.array_equal(other.picture, expected(other.request))
+
+
+def test_a_new_scene_is_no_movement(renderer, scene, tmp_path):
+    other = tmp_path / "other.cli"
+    other.write_text(SPHERE.replace("-4", "-6"))
+    answer(renderer, turned(Request(scene, "hit", SIZE), 5))
+    drawing = answer(renderer, Request(other, "hit", SIZE))
+    assert not drawing.moving
+    assert np.array_equal(drawing.picture, expected(drawing.request))
+
+
+def test_the_file_that_is_read_again_is_turned_about_its_own_middle(renderer, scene):
+    request = turned(Request(scene, "normal", SIZE), 90)
+    answer(renderer, request)
+    scene.write_text(SPHERE.replace("sphere 1 0 0 -4", "sphere 1 2 0 -8"))
+    drawing = answer(renderer, replace(request, readings=1))
+    assert np.array_equal(drawing.picture, expected(request))
+
+
+def test_the_path_that_drew_is_told(renderer, scene):
+    assert answer(renderer, Request(scene, "hit", SIZE)).path in ("numpy", "compiled")
+    for path in ("numpy", "compiled"):
+        assert worker.path_of(SimpleNamespace(path_name=path)) == path

@@ -59,6 +59,23 @@ class Sketch:
     def click(self, x: int, y: int) -> None:
         self.xdotool("mousemove", str(self.left + x), str(self.top + y), "click", "1")
 
+    def drag(self, right: int, down: int, release: bool = True) -> None:
+        """Take hold in the window's middle and pull, in four steps."""
+        x, y = self.left + self.width // 2, self.top + self.width // 2
+        self.xdotool("mousemove", str(x), str(y), "mousedown", "1")
+        for part in (1, 2, 3, 4):
+            self.xdotool("mousemove", str(x + right * part // 4), str(y + down * part // 4))
+        if release:
+            self.release()
+
+    def release(self) -> None:
+        self.xdotool("mouseup", "1")
+
+    def wheel(self, notches: int) -> None:
+        """Turn the wheel over the window's middle, away from the user where notches are above 0."""
+        self.xdotool("mousemove", str(self.left + self.width // 2), str(self.top + self.width // 2))
+        self.xdotool("click", "--repeat", str(abs(notches)), "4" if notches > 0 else "5")
+
     def screen(self) -> np.ndarray:
         """What the window shows: uint8 (height, width, 3)."""
         image = ImageGrab.grab(xdisplay=self.display)
