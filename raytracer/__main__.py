@@ -85,6 +85,34 @@ def chart(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def bench(arguments: argparse.Namespace) -> int:
+    """Measure pictures, rays and files on this machine, beside the peers that are installed: about two minutes."""
+    from raytracer import bench as figures
+    from raytracer.interpreter import write_scene
+
+    if arguments.write_scene:
+        spheres, path = arguments.write_scene
+        write_scene(figures.spread(_whole(spheres), arguments.seed), path)
+        return 0
+    from raytracer import bench_chart  # loads matplotlib
+
+    arguments.output.mkdir(parents=True, exist_ok=True)
+    effort = figures.Effort().longer() if arguments.long else figures.Effort()
+    with tqdm(bar_format="{desc}", leave=False, disable=None) as line:
+        report = figures.measure(effort, arguments.seed, progress=line.set_description_str)
+    paths = bench_chart.write(arguments.output, report)
+    print(bench_chart.as_markdown(report))
+    print(*paths, sep="\n")
+    return int(report.faulty)
+
+
+def _whole(text: str) -> int:
+    """ValueError if it is no number of spheres."""
+    if not text.isdecimal():
+        raise ValueError(f"--write-scene: found {text!r}, expected a number of spheres")
+    return int(text)
+
+
 def _plan(arguments: argparse.Namespace) -> Plan:
     width, height = arguments.size
     return make_plan(interpreter(arguments.scene), arguments.stage, width, height, arguments.sampling, arguments.method)
@@ -125,6 +153,11 @@ _PICTURE = (
     ),
     _METHOD,
 )
+_FOLDER = Argument(
+    ("-o", "--output"),
+    {"metavar": "FOLDER", "type": Path, "default": Path("docs"), "help": "where to, default docs"},
+)
+_SEED = Argument(("--seed",), {"metavar": "S", "type": int, "default": 1, "help": "of what is random, default 1"})
 COMMANDS: dict[str, tuple[Callable[[argparse.Namespace], int], tuple[Argument, ...]]] = {
     "render": (
         render,
@@ -152,11 +185,22 @@ COMMANDS: dict[str, tuple[Callable[[argparse.Namespace], int], tuple[Argument, .
     "chart": (
         chart,
         (
-            Argument(
-                ("-o", "--output"),
-                {"metavar": "FOLDER", "type": Path, "default": Path("docs"), "help": "where to, default docs"},
-            ),
+            _FOLDER,
             Argument(("--long",), {"action": "store_true", "help": "ten times the rays, and about ten times as long"}),
+        ),
+    ),
+    "bench": (
+        bench,
+        (
+            _FOLDER,
+            Argument(
+                ("--long",), {"action": "store_true", "help": "more rounds, and more spheres for peers and checks"}
+            ),
+            _SEED,
+            Argument(
+                ("--write-scene",),
+                {"metavar": ("N", "OUT.cli"), "nargs": 2, "help": "only write the scene of N spheres, for other tools"},
+            ),
         ),
     ),
     "verify": (
@@ -166,7 +210,7 @@ COMMANDS: dict[str, tuple[Callable[[argparse.Namespace], int], tuple[Argument, .
             Argument(
                 ("--rays",), {"metavar": "N", "type": count, "default": 10_000, "help": "a family, default 10000"}
             ),
-            Argument(("--seed",), {"metavar": "S", "type": int, "default": 1, "help": "of the random rays, default 1"}),
+            _SEED,
         ),
     ),
 }
