@@ -147,6 +147,18 @@ class Nearest(NamedTuple):
         return cls(np.full(shape, np.inf), np.zeros(shape), np.full(shape, -1, np.int32), np.zeros(shape, bool))
 
 
+class Tree(NamedTuple):
+    """A tree of boxes about spheres: see `kernels.bvh`."""
+
+    ids: np.ndarray  # int32 (n rounded up to eights,), the spheres in the tree's order; −1 in what is to spare
+    spheres: np.ndarray  # float64, flat: their x, then their y, z, radii; NaN in what is to spare
+    low: np.ndarray  # float64, flat: the x of all boxes' low corners, then their y, z; some to spare at a level's end
+    high: np.ndarray  # float64, likewise
+    levels: np.ndarray  # int64, where each level begins
+    counts: np.ndarray  # int64, how many boxes it has
+    depth: int  # how many levels there are
+
+
 # ------------------------------------------------------------------------------------ what `raytracer.screen` shares
 
 
@@ -213,6 +225,18 @@ class Paints(NamedTuple):
     lights: np.ndarray  # float64 (n, 6): the place as seen from the eye, the colour
     material: np.ndarray  # int32 (spheres,), a row of colours
     colours: np.ndarray  # float64, flat: red, green, blue, 0 of each material
+
+
+class FineRays(NamedTuple):
+    """What the directions of some rows need for twice the digits: see `certified.fine_direction`."""
+
+    across_low: np.ndarray  # the rest of U, eight elements to spare
+    x: np.ndarray  # V·v − d·w, its components and their rests, (rows,)
+    x_low: np.ndarray
+    y: np.ndarray
+    y_low: np.ndarray
+    z: np.ndarray
+    z_low: np.ndarray
 
 
 class Canvas(NamedTuple):

@@ -70,9 +70,7 @@ def make_lens(raster: Raster) -> Lens:
     """Of a frame that magnifies rounding errors too much, one that knows no box."""
     rows, magnification = inverse_frame(raster.camera) or ([[1.0, 0.0, 0.0]] * 3, inf)
     exponents = [frexp(max(map(abs, row)))[1] for row in rows]
-    nx, ny, nz = (
-        (ldexp(x, -e), ldexp(y, -e), ldexp(z, -e)) for (x, y, z), e in zip(rows, exponents, strict=True)
-    )
+    nx, ny, nz = ((ldexp(x, -e), ldexp(y, -e), ldexp(z, -e)) for (x, y, z), e in zip(rows, exponents, strict=True))
     cross_x, cross_y = _cross(nx, nz), _cross(ny, nz)
     width, height, shift = float(raster.width), float(raster.height), float(SAMPLINGS[raster.sampling])
     up_x, up_y = exponents[0] - exponents[2], exponents[1] - exponents[2]

@@ -171,6 +171,23 @@ def directions_of(grid: Grid, across: np.ndarray, up: np.ndarray) -> Vectors:
     return x, y, z
 
 
+def fine_columns(raster: Raster) -> Twofold:
+    """U of each column in two-fold float64: two arrays (width,)."""
+    across, _ = raster.numerators(np.arange(raster.width), 0)
+    return _ratio(across.astype(float), float(raster.height))
+
+
+def fine_rows(raster: Raster, rows: slice) -> tuple[Twofold, Twofold, Twofold]:
+    """V·v − d·w of some rows in two-fold float64: for each component two arrays (rows,)."""
+    _, up = raster.numerators(0, np.arange(rows.start, rows.stop))
+    fine_up, back = _ratio(up.astype(float), float(raster.height)), focal_length(raster.camera.fov)
+    x, y, z = (
+        add(*multiply(*fine_up, v, 0.0), *two_product(-back, w))
+        for v, w in zip(raster.camera.v, raster.camera.w, strict=True)
+    )
+    return x, y, z
+
+
 def twofold_eye_rays(raster: Raster, xs: np.ndarray, ys: np.ndarray) -> TwofoldRays:
     """The rays of single pixels, columns xs and rows ys, arrays of shape (n,)."""
     across, up = (_ratio(n.astype(float), float(raster.height)) for n in raster.numerators(xs, ys))

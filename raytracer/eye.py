@@ -13,10 +13,10 @@ import numpy as np
 from raytracer import backend, plain
 from raytracer.arrays import Balls, Candidates, First, Grid, Hits, Seen
 from raytracer.boxes import make_lens
-from raytracer.camera import Raster, eye_grid, rows_of, spread, squares, twofold_eye_rays
-from raytracer.certified import LARGEST_SPREAD
+from raytracer.camera import Raster, eye_grid, fine_columns, fine_rows, rows_of, spread, squares, twofold_eye_rays
+from raytracer.certified import LARGEST_SPREAD, fine_direction, refine
 from raytracer.methods import CERTIFIED
-from raytracer.plain import candidates_of
+from raytracer.plain import candidates_of, xyz
 from raytracer.scene import Scene
 from raytracer.settle import Bundle, Index, Targets, in_twofold, known_in_integers, polish, settle
 from raytracer.units import sphere_units
@@ -60,7 +60,8 @@ class Eye(NamedTuple):
         hits = Hits(first.k / squares(rows_of(self.grid, rows)), first.index)
         settle(hits, first.unsure, self._pixels_of(rows), self.targets)
         if polished:
-            polish(hits, np.nonzero((hits.index >= 0) & ~first.unsure), self._pixels_of(rows), self.targets)
+            left = self._refine(hits, rows, (hits.index >= 0) & ~first.unsure)
+            polish(hits, np.nonzero(left), self._pixels_of(rows), self.targets)
         return Hits(np.ldexp(hits.t, self.unit) if self.unit else hits.t, self._places(hits.index))
 
     @_NOT_A_NUMBER_IS_NO_ERROR
@@ -72,6 +73,19 @@ class Eye(NamedTuple):
         source = self._pixels_of(row)
         found = in_twofold(source.bundle(pixel), source.candidates(pixel), self.targets)
         return "integers" if found.unsure[0] else "two-fold float64"
+
+    def _refine(self, hits: Hits, rows: slice, which: np.ndarray) -> np.ndarray:
+        """Bring the t of these hits to the last digit, and return those of which that is not certain."""
+        ys, xs = which.nonzero()
+        across, low = fine_columns(self.raster)
+        components = zip(self.grid.u, fine_rows(self.raster, rows), strict=True)
+        x, y, z = (fine_direction(across[xs], low[xs], u, rest[ys], rest_low[ys]) for u, (rest, rest_low) in components)
+        balls = self.targets.balls[hits.index[which]]
+        t, sure = refine(hits.t[which], x, y, z, *self.origin, *xyz(balls), balls[:, 3])
+        hits.t[which] = np.where(sure, t, hits.t[which])
+        left = which.copy()
+        left[which] = ~sure
+        return left
 
     def _first(self, rows: slice) -> First:
         """What float64 makes of these rows."""

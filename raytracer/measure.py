@@ -27,7 +27,7 @@ from raytracer.families import FAMILIES, Bundle, bundles
 from raytracer.interpreter import interpreter
 from raytracer.methods import METHODS
 from raytracer.plan import Plan, make_plan
-from raytracer.render import draw, trace_whole
+from raytracer.render import draw, hits_of, open_tracer
 from raytracer.scene import Scene
 from raytracer.trace import ray_intersect_scene, trace_given
 
@@ -282,7 +282,7 @@ def score_scenes(effort: Effort, progress: Progress) -> list[Frame]:
 
 def _score_scene(scene: Scene, name: str, effort: Effort) -> list[Frame]:
     truth = make_plan(scene, "diffuse", effort.size, effort.size)
-    true_index, true_picture = trace_whole(truth).hits.index, draw(truth)
+    true_index, true_picture = _index(truth), draw(truth)
     entrants, pictures, frames = racers(effort), dict[Racer, np.ndarray](), []
     for racer in entrants:
         if racer.backend == COMPILED:
@@ -290,7 +290,7 @@ def _score_scene(scene: Scene, name: str, effort: Effort) -> list[Frame]:
     lanes = {racer: partial(_time_frame, racer, scene, effort.size, pictures) for racer in entrants}
     times = in_turns(lanes, effort.rounds)
     for racer in entrants:
-        wrong = int((trace_whole(plan_on(scene, racer, effort.size)).hits.index != true_index).sum())
+        wrong = int((_index(plan_on(scene, racer, effort.size)) != true_index).sum())
         wrong_bytes = int((pictures[racer] != true_picture).sum())
         frames.append(Frame(racer, name, true_index.size, wrong, wrong_bytes, times[racer]))
     return frames
@@ -307,8 +307,13 @@ def _time_frame(
 def plan_on(scene: Scene, racer: Racer, size: int) -> Plan:
     """A picture's plan, on that backend."""
     path: ModuleType = backend.load() if racer.backend == COMPILED else plain
-    plan = make_plan(scene, "diffuse", size, size, method=racer.method)
-    return replace(plan, eye=plan.eye._replace(targets=plan.eye.targets._replace(path=path)))
+    return make_plan(scene, "diffuse", size, size, method=racer.method, path=path)
+
+
+def _index(plan: Plan) -> np.ndarray:
+    """Which shape each pixel shows."""
+    with open_tracer(plan) as tracer:
+        return hits_of(plan, tracer).index
 
 
 def _clocked(work: Callable[[], Result]) -> tuple[float, Result]:

@@ -26,6 +26,7 @@ from raytracer.certified import (
     meet,
     meet_twofold,
     nearer,
+    refine,
 )
 from raytracer.methods import METHODS, Vector
 
@@ -92,6 +93,18 @@ def nearest_given(origins: np.ndarray, rays: Rays, balls: np.ndarray, nearest: N
         lx, ly, lz, c, c_error, size = look(*xyz(origins), *ball)
         h = inner(rays.x, rays.y, rays.z, lx, ly, lz)
         _update(nearest, *meet(h, rays.square, c, c_error, size, radius, rays.reach), i)
+
+
+def refine_given(
+    origins: np.ndarray, rays: Rays, balls: np.ndarray, t: np.ndarray, index: np.ndarray, unsure: np.ndarray
+) -> np.ndarray:
+    """Bring the t of certain hits to the last digit, in place; returns those of which that is not certain, int (n,)."""
+    which = np.flatnonzero((index >= 0) & ~unsure)
+    zero, spheres = np.zeros(len(which)), balls[index[which]]
+    x, y, z = ((component[which], zero) for component in rays[:3])
+    finer, sure = refine(t[which], x, y, z, *xyz(origins[which]), *xyz(spheres), spheres[:, 3])
+    t[which] = np.where(sure, finer, t[which])
+    return which[~sure]
 
 
 def nearest_twofold(

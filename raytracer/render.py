@@ -75,7 +75,9 @@ def draw(
             _paint(plan, tracer, picture, watch)
         else:
             whole = whole_of(plan, tracer, watch)
-            share_bands(tracer, plan, watch, lambda rows, worker: _draw_rows(plan, tracer, rows, worker, whole, picture))
+            share_bands(
+                tracer, plan, watch, lambda rows, worker: _draw_rows(plan, tracer, rows, worker, whole, picture)
+            )
     return picture
 
 
@@ -205,15 +207,14 @@ def eye_hits(
 
 
 def warm_up(scene: Scene, stage: str, method: str = CERTIFIED) -> bool:
-    """Have the kernels ready, machine code and all, that a picture needs; False if there is no compiler.
+    """Have the kernels ready that a picture needs, machine code and all; False if there is no compiler.
 
-    To make machine code takes seconds, once. The backend learns of the kernels only afterwards, and draws without them
+    To make machine code takes seconds, once. The backend does not learn of the kernels from this, and draws without them
     in the meantime.
     """
     kernels = backend.import_kernels()
     if kernels is not None:
         draw(make_plan(scene, stage, 16, 16, method=method, path=kernels))
-        backend.load()
     return kernels is not None
 
 

@@ -12,7 +12,7 @@ is not certain are listed, decided by `settle`, and painted anew.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from itertools import chain
 from queue import Empty, Full, LifoQueue
@@ -23,14 +23,14 @@ import numpy as np
 from numpy.lib.stride_tricks import as_strided
 
 from raytracer import plain
-from raytracer.arrays import Bins, Candidates, Canvas, HitRows, Hits, Paints, Scratch, Seen, Sides, Slow, View
+from raytracer.arrays import Bins, Candidates, Canvas, FineRays, HitRows, Hits, Paints, Scratch, Seen, Sides, Slow, View
 from raytracer.boxes import Lens, make_lens
-from raytracer.camera import Raster, eye_grid
+from raytracer.camera import Raster, eye_grid, fine_columns, fine_rows
 from raytracer.eye import bundle_of, usable_spread
 from raytracer.plan import Plan
 from raytracer.pool import cores, share
 from raytracer.scene import Materials, Scene, Spheres
-from raytracer.settle import Bundle, Index, Targets, known_in_integers, settled
+from raytracer.settle import Bundle, Index, Targets, known_in_integers, polish, settled
 from raytracer.shading import to_byte
 from raytracer.stages import light_from_eye
 from raytracer.units import sphere_units
@@ -104,7 +104,9 @@ class Screen(NamedTuple):
     slow: Slow
     bins: Bins
     targets: Targets
-    desks: list[tuple[Scratch, np.ndarray]]  # of each thread, and its list of doubtful pixels, which begins with a length
+    desks: list[
+        tuple[Scratch, np.ndarray]
+    ]  # of each thread, and its list of doubtful pixels, which begins with a length
 
     @property
     def boxes(self) -> np.ndarray:
@@ -117,21 +119,38 @@ class Screen(NamedTuple):
         """The picture's rows, cut between tiles into some pieces for each core, so that all are done at one time."""
         height = self.kernels.TILE_HEIGHT
         rows, pixels = -(-self.raster.height // height), self.raster.height * self.raster.width
-        moments = (len(self.slow.ids) + shading / 8) * pixels / _PIXELS_A_MOMENT + len(self.bins.ids) / _SPHERES_A_MOMENT
+        moments = (len(self.slow.ids) + shading / 8) * pixels / _PIXELS_A_MOMENT + len(
+            self.bins.ids
+        ) / _SPHERES_A_MOMENT
         step = max(1, min(rows // max(4 * cores(), int(moments)), _BAND_PIXELS // (height * self.raster.width)))
         cuts = [row * height for row in range(0, rows, step)]
         return [slice(a, b) for a, b in zip(cuts, [*cuts[1:], self.raster.height], strict=True)]
 
-    @_NOT_A_NUMBER_IS_NO_ERROR
     def hits(self, rows: slice, worker: int = 0, polished: bool = False) -> Hits:
         """What the rays of these rows, cut between tiles, hit first: as `Eye.hits`."""
-        hits = Hits(np.empty((rows.stop - rows.start, self.raster.width)),
-                    np.empty((rows.stop - rows.start, self.raster.width), np.int32))  # fmt: skip
+        shape = rows.stop - rows.start, self.raster.width
+        hits = Hits(np.empty(shape), np.empty(shape, np.int32))
+        self.find(hits, rows, worker, polished)
+        return self.in_scene(hits)
+
+    @_NOT_A_NUMBER_IS_NO_ERROR
+    def find(self, hits: Hits, rows: slice, worker: int, polished: bool) -> None:
+        """`hits`, into arrays, in units, and with numbers of spheres."""
         out = HitRows(hits.t.reshape(-1), hits.index.reshape(-1), rows.start, self.raster.width)
-        for doubtful in chain(self.paint("find_hits", rows, worker, _NO_PAINTS, out), self.doubtful(worker)):
+        kernel, paints = ("find_fine_hits", self._fine_rays(rows)) if polished else ("find_hits", _NO_PAINTS)
+        for doubtful in chain(self.paint(kernel, rows, worker, paints, out), self.doubtful(worker)):
             where = doubtful.ys - rows.start, doubtful.xs
             hits.t[where], hits.index[where] = doubtful.hits()
-        return self.in_scene(hits)
+        if polished and np.isnan(hits.t).any():
+            ys, xs = np.nonzero(np.isnan(hits.t))
+            some = Hits(hits.t[ys, xs], hits.index[ys, xs])
+            polish(some, (np.arange(len(xs)),), Pixels(self, xs, ys + rows.start), self.targets)
+            hits.t[ys, xs] = some.t
+
+    def _fine_rays(self, rows: slice) -> FineRays:
+        _, low = fine_columns(self.raster)
+        x, y, z = fine_rows(self.raster, rows)
+        return FineRays(np.concatenate([low, np.zeros(8)]), *x, *y, *z)
 
     def in_scene(self, hits: Hits) -> Hits:
         """t in the scene's unit of length, and places in the file in place of numbers of spheres."""
@@ -144,7 +163,9 @@ class Screen(NamedTuple):
     def kernels(self) -> ModuleType:
         return self.targets.path
 
-    def paint(self, painter: str, rows: slice, worker: int, paints: Paints, out: Canvas | HitRows) -> Iterator[Pixels]:
+    def paint(
+        self, painter: str, rows: slice, worker: int, paints: Paints | FineRays, out: Canvas | HitRows
+    ) -> Iterator[Pixels]:
         """Paint these rows, cut between tiles, by a kernel; yields doubtful pixels when there is no room for more.
 
         What is left of them `doubtful` tells.
@@ -202,9 +223,7 @@ def open_screen(scene: Scene, raster: Raster, kernels: ModuleType, threads: int 
 def make_paints(plan: Plan, screen: Screen) -> Paints:
     """What the plan's stage is painted with."""
     flat, background = plan.stage.flat(plan.scene)
-    lights = [
-        (*light_from_eye(light, plan.scene.camera, screen.unit).tolist(), *light.colour) for light in plan.lights
-    ]
+    lights = [(*light_from_eye(light, plan.scene.camera, screen.unit).tolist(), *light.colour) for light in plan.lights]
     materials = plan.scene.materials
     return Paints(
         to_byte(np.array(background)), to_byte(np.array(flat)), np.array(lights, np.float64).reshape(-1, 6),

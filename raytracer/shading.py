@@ -13,6 +13,19 @@ from raytracer.twofold import Number, select
 
 Three = tuple[Number, Number, Number]
 
+_SMALL_STEP = 2.0**-20
+
+
+def land(t: Number, d: Three, away: Three, radius: Number) -> tuple[Three, Three]:
+    """P and n = r·N of a hit, after one Newton step that brings n as close to the sphere as float64 does."""
+    p = t * d[0], t * d[1], t * d[2]
+    n = away[0] + p[0], away[1] + p[1], away[2] + p[2]
+    slope = n[0] * d[0] + n[1] * d[1] + n[2] * d[2]
+    step = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2] - radius * radius) / (slope + slope)
+    step = select(abs(step) < _SMALL_STEP * t, step, 0.0)  # a ray that only grazes leads anywhere
+    x, y, z = step * d[0], step * d[1], step * d[2]
+    return (p[0] - x, p[1] - y, p[2] - z), (n[0] - x, n[1] - y, n[2] - z)
+
 
 def towards(p: Three, n: Three, light: Three) -> tuple[Number, Number]:
     """n·T and T·T for T from the point P to a light, both as seen from the eye."""
@@ -29,4 +42,3 @@ def to_byte(colour: Number) -> Number:
     """255 · clip(C, 0, 1) + ½, to be cut off to a whole number; what is not a number is black."""
     positive = select(colour > 0.0, colour, 0.0)
     return select(positive < 1.0, positive, 1.0) * 255.0 + 0.5
-

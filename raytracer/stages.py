@@ -67,18 +67,20 @@ class Block:
         return sphere_units(self.scene.camera.eye, self.scene.spheres)[0]
 
     @cached_property
-    def _from_eye(self) -> Vectors:
-        """P, from the eye to the hit point, in units: three arrays (hits,)."""
-        t = np.ldexp(self.hits.t[self.hit], -self._unit)
-        x, y, z = (t * component[self.hit] for component in self._directions)
-        return x, y, z
+    def _landed(self) -> tuple[shading.Three, shading.Three]:
+        """P, from the eye to the hit points, and r·N, from the spheres' centres to them, in units: arrays (hits,)."""
+        eye, balls = np.ldexp(self.scene.camera.eye, -self._unit), np.ldexp(self._balls, -self._unit)
+        x, y, z = (component[self.hit] for component in self._directions)
+        away = eye[0] - balls[:, 0], eye[1] - balls[:, 1], eye[2] - balls[:, 2]
+        return shading.land(np.ldexp(self.hits.t[self.hit], -self._unit), (x, y, z), away, balls[:, 3])
 
-    @cached_property
-    def _from_centre(self) -> Vectors:
-        """r·N, from the sphere's centre to the hit point, in units: three arrays (hits,)."""
-        eye, centres = (np.ldexp(x, -self._unit) for x in (self.scene.camera.eye, self._balls))
-        x, y, z = (eye[k] - centres[:, k] + self._from_eye[k] for k in range(3))
-        return x, y, z
+    @property
+    def _from_eye(self) -> shading.Three:
+        return self._landed[0]
+
+    @property
+    def _from_centre(self) -> shading.Three:
+        return self._landed[1]
 
     @cached_property
     def _balls(self) -> np.ndarray:

@@ -7,15 +7,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from raytracer import backend
-from raytracer.arrays import Candidates, Hits, Nearest, Sides
+from raytracer import backend, plain
+from raytracer.arrays import Candidates, Hits, Nearest, Sides, Tree
 from raytracer.camera import given_rays, twofold_given_rays
 from raytracer.methods import CERTIFIED, check_method
+from raytracer.pool import share
 from raytracer.settle import Bundle, Index, Targets, polish, settle
 from raytracer.units import in_units, unit_directions
 from raytracer.usual import usual_given
 
 _CHUNK = 1 << 14  # rays that are traced together: their arrays fit a core's cache
+_FEW = 16  # spheres, up to which every ray is tested against every sphere
 
 # A NaN or an infinity makes a decision uncertain, and the next level takes it.
 _NOT_A_NUMBER_IS_NO_ERROR = np.errstate(all="ignore")
@@ -54,36 +56,54 @@ def trace_given(
     unit, (origins, balls) = in_units(origins, np.column_stack([centres, radii]))
     exponents, directions = unit_directions(directions)
     targets = Targets(balls, Sides.unknown(), path)
+    tree = _plant(balls, path) if path is not plain and len(balls) > _FEW else None
     hits = Hits(np.empty(len(origins)), np.empty(len(origins), np.int32))
-    for start in range(0, len(origins), _CHUNK):
-        some = slice(start, start + _CHUNK)
-        hits.t[some], hits.index[some] = _trace_given(origins[some], directions[some], targets)
+
+    @_NOT_A_NUMBER_IS_NO_ERROR
+    def trace(some: slice, worker: int) -> None:
+        rays = GivenRays(origins[some], directions[some], targets, tree)
+        hits.t[some], hits.index[some] = rays.hits()
+
+    share([slice(start, start + _CHUNK) for start in range(0, len(origins), _CHUNK)], trace)
     return Hits(np.ldexp(hits.t, unit - exponents), hits.index)
 
 
-def _trace_given(origins: np.ndarray, directions: np.ndarray, targets: Targets) -> Hits:
-    nearest = Nearest.nothing_yet((len(origins),))
-    targets.path.nearest_given(origins, given_rays(directions), targets.balls, nearest)
-
-    hits, source = Hits(nearest.t, nearest.index), GivenRays(origins, directions, len(targets.balls))
-    settle(hits, nearest.unsure, source, targets)
-    polish(hits, np.nonzero((hits.index >= 0) & ~nearest.unsure), source, targets)
-    return hits
+def _plant(balls: np.ndarray, kernels: ModuleType) -> Tree:
+    """The tree over spheres (s, 4)."""
+    tree: Tree = kernels.build(balls, np.argsort(kernels.along_curve(balls)))
+    return tree
 
 
 class GivenRays(NamedTuple):
-    """Rays as the levels above float64 want them, each against all spheres."""
+    """Some rays, and the spheres that they are traced against."""
 
     origins: np.ndarray  # (n, 3)
     directions: np.ndarray  # (n, 3)
-    spheres: int
+    targets: Targets
+    tree: Tree | None
+
+    def hits(self) -> Hits:
+        """What they hit, t to the last digit."""
+        nearest, rays, (balls, _, path) = Nearest.nothing_yet((len(self.origins),)), given_rays(self.directions), self.targets
+        if self.tree is None:
+            path.nearest_given(self.origins, rays, balls, nearest)
+        else:
+            path.nearest_in_tree(self.origins, rays, balls, self.tree, nearest)
+        hits = Hits(nearest.t, nearest.index)
+        left = path.refine_given(self.origins, rays, balls, hits.t, hits.index, nearest.unsure)
+        settle(hits, nearest.unsure, self, self.targets)
+        polish(hits, (left,), self, self.targets)
+        return hits
 
     def bundle(self, which: Index) -> Bundle:
         chosen = self.directions[which]
         return Bundle(self.origins[which], twofold_given_rays(chosen), lambda k: (chosen[k].tolist(), 1))
 
     def candidates(self, which: Index) -> Candidates:
-        return Candidates.all(len(which[0]), self.spheres)
+        if self.tree is None:
+            return Candidates.all(len(which[0]), len(self.targets.balls))
+        rays = given_rays(self.directions[which])
+        return Candidates(*self.targets.path.candidates_in_tree(self.origins[which], rays, self.targets.balls, self.tree))
 
 
 def _vectors(name: str, vectors: np.ndarray) -> np.ndarray:

@@ -10,18 +10,16 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 
-from raytracer import Cancelled, Plan, Scene, SceneError, backend, interpreter, make_plan, plain
+from raytracer import Cancelled, Scene, SceneError, backend, interpreter, make_plan
 from raytracer.image import to_bytes
 from raytracer.methods import CERTIFIED
-from raytracer.render import draw
+from raytracer.render import draw, warm_up
 from raytracer.scene import Vector
 from raytracer.stages import FALSE_HIT, FALSE_MISS, WRONG_SHAPE
-from raytracer.trace import Eye
 from sketch.orbit import HOME, Orbit, pivot_of, seen_from
 from sketch.pace import COARSENESS, Pace, enlarged
 
@@ -56,7 +54,7 @@ class Drawing:
     done: float = 0.0  # the part of the picture that is drawn
     moving: bool = False  # whether it is a frame of a movement
     coarse: int = 1  # columns and rows that a pixel is drawn across
-    path: str = ""  # that drew it, see `path_of`
+    path: str = ""  # that drew it, see `Plan.path_name`
     milliseconds: float = 0.0  # that drawing took
     wrong: int | None = None  # pixels whose hit or shape is wrong; None where the stage does not tell
     warnings: tuple[str, ...] = ()
@@ -175,7 +173,7 @@ class Renderer:
         finally:
             elapsed = 1000 * (time.perf_counter() - start)
             self._pace.took(coarse, elapsed)
-        frame = Drawing(request, picture, scene, 1.0, True, coarse, path_of(plan), elapsed, warnings=plan.warnings)
+        frame = Drawing(request, picture, scene, 1.0, True, coarse, plan.path_name, elapsed, warnings=plan.warnings)
         self.drawing = self.whole = frame
 
     def _shows(self, request: Request) -> bool:
@@ -193,7 +191,7 @@ class Renderer:
         scene, looked = self._scene(request), time.perf_counter()
         start = looked
         plan = make_plan(scene, request.stage, request.size, request.size, method=request.method)
-        self.drawing = drawing = replace(drawing, scene=scene, warnings=plan.warnings, path=path_of(plan))
+        self.drawing = drawing = replace(drawing, scene=scene, warnings=plan.warnings, path=plan.path_name)
 
         def progress(done: int, total: int, rows: slice) -> None:
             nonlocal looked
@@ -229,30 +227,9 @@ class Renderer:
 
 
 def bring_in_kernels(seen: Drawing) -> bool:
-    """Draw a few pixels of what is seen with the compiled kernels, so that their machine code is there, found or made.
-
-    To make it takes seconds, once; so the backend learns of the kernels only afterwards, and draws without them in the
-    meantime. False: there is no compiler.
-    """
-    try:
-        kernels = import_module("raytracer.kernels")
-    except ImportError:
-        return False
-
-    def compiled(eye: Eye) -> Eye:
-        kernels.see(eye.origin, eye.targets.centres, eye.targets.radii)
-        return eye._replace(targets=eye.targets._replace(path=kernels))
-
+    """Have the kernels ready for what is seen, machine code and all; False if there is no compiler."""
     assert seen.scene is not None
-    plan = make_plan(seen.scene, seen.request.stage, 8, 8, method=seen.request.method)
-    draw(replace(plan, eye=compiled(plan.eye), truth=plan.truth and compiled(plan.truth)))
-    return True
-
-
-def path_of(plan: Plan) -> str:
-    """Which path draws a plan: "numpy" or "compiled"."""
-    known: str | None = getattr(plan, "path_name", None)
-    return known or ("numpy" if plan.eye.targets.path is plain else "compiled")
+    return warm_up(seen.scene, seen.request.stage, seen.request.method)
 
 
 def _wrong(request: Request, picture: np.ndarray) -> int | None:

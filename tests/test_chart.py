@@ -158,8 +158,8 @@ def test_a_plan_is_on_the_backend_asked_for():
     from raytracer import backend, interpreter, plain
 
     scene = interpreter(ORDINARY_SCENE)
-    assert plan_on(scene, Racer("haines", NUMPY), 8).eye.targets.path is plain
-    assert plan_on(scene, Racer("haines", COMPILED), 8).eye.targets.path is backend.load()
+    assert plan_on(scene, Racer("haines", NUMPY), 8).path is plain
+    assert plan_on(scene, Racer("haines", COMPILED), 8).path is backend.load()
 
 
 def test_all_take_turns_each_time_another_first_and_the_slow_leave_early():

@@ -115,6 +115,7 @@ def test_both_paths_find_the_same_bits(method, monkeypatch):
     found = []
     for path in (plain, backend.load()):
         monkeypatch.setattr(backend, "choose", lambda tests, loops, path=path: path)
+        monkeypatch.setattr(backend, "loaded", lambda path=path: path)
         hits = [found_by(method, bundle) for family in FAMILIES for bundle in bundles(family, 64, SEED)]
         found.append([array for pair in [*hits, eye_hits(scene, 40, 30, method=method)] for array in pair])
     for array, other in zip(*found, strict=True):

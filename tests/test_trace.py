@@ -15,7 +15,6 @@ from raytracer import backend, exact, eye_hits, interpreter, plain, ray_intersec
 from raytracer.camera import make_raster
 from raytracer.interpreter import interpret
 from raytracer.scene import Camera
-from raytracer.trace import open_eye, polished_rows
 
 PATHS = {"numpy": plain, "compiled": backend.load()}
 
@@ -25,8 +24,13 @@ def path(request, monkeypatch):
     """Each test that asks for it runs on the numpy path and on the compiled path."""
     if request.param == "compiled" and backend.why_no_compiler():
         pytest.skip("numba is not installed")
-    monkeypatch.setattr(backend, "choose", lambda tests, loops: PATHS[request.param])
+    trace_on(PATHS[request.param], monkeypatch)
     return PATHS[request.param]
+
+
+def trace_on(path, monkeypatch):
+    monkeypatch.setattr(backend, "choose", lambda tests, loops: path)
+    monkeypatch.setattr(backend, "loaded", lambda: path)
 
 
 @pytest.mark.parametrize("case", CASES, ids=str)
@@ -105,7 +109,7 @@ def test_both_paths_find_the_same_bits(scene_path, monkeypatch):
     scene = interpreter(scene_path)
     found = []
     for module in PATHS.values():
-        monkeypatch.setattr(backend, "choose", lambda tests, loops, module=module: module)
+        trace_on(module, monkeypatch)
         found.append(eye_hits(scene, 40, 30))
     for array, other in zip(*found, strict=True):
         np.testing.assert_array_equal(array, other)
@@ -176,8 +180,8 @@ def test_boxes_lose_no_pixel(path):
             f"sphere {r!r} {x!r} {y!r} {z!r}" for r, (x, y, z) in zip(radii.tolist(), centres.tolist(), strict=True)
         ]
         scene = interpret("\n".join(["surface 1 1 1 0 0 0 0 0 0 1 0", *lines]))
-        eye = open_eye(raytracer.Scene(camera, spheres=scene.spheres, materials=scene.materials), raster)
-        hits = polished_rows(eye, slice(0, 11))
+        seen = raytracer.Scene(camera, spheres=scene.spheres, materials=scene.materials)
+        hits = eye_hits(seen, 13, 11, sampling="centre")
         directions = [[float(x) for x in raster.exact_direction(x, y)] for y in range(11) for x in range(13)]
         every = ray_intersect_scene([camera.eye] * 143, directions, centres, radii)
         np.testing.assert_array_equal(hits.index.ravel(), every.index)

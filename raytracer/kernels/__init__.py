@@ -4,8 +4,9 @@ from raytracer.kernels.compiler import cache_named_after_sources
 
 with cache_named_after_sources():
     from raytracer.kernels.bounds import TILE_HEIGHT, TILE_WIDTH, begin, bound, fill
-    from raytracer.kernels.tiles import find_hits, paint_diffuse, paint_flat, paint_normal
-    from raytracer.kernels.trace import nearest_given, nearest_twofold, polish
+    from raytracer.kernels.bvh import along_curve, build, candidates_in_tree, nearest_in_tree
+    from raytracer.kernels.tiles import find_fine_hits, find_hits, paint_diffuse, paint_flat, paint_normal
+    from raytracer.kernels.trace import nearest_given, nearest_twofold, polish, refine_given
     from raytracer.kernels.usual import usual_eye, usual_given
     from raytracer.kernels.visibility import STRIDE, candidates
 
@@ -13,17 +14,23 @@ __all__ = [
     "STRIDE",
     "TILE_HEIGHT",
     "TILE_WIDTH",
+    "along_curve",
     "begin",
     "bound",
+    "build",
     "candidates",
+    "candidates_in_tree",
     "fill",
+    "find_fine_hits",
     "find_hits",
     "nearest_given",
+    "nearest_in_tree",
     "nearest_twofold",
     "paint_diffuse",
     "paint_flat",
     "paint_normal",
     "polish",
+    "refine_given",
     "usual_eye",
     "usual_given",
 ]

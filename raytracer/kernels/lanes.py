@@ -350,9 +350,7 @@ def put_pixels(typing, picture, start, step, red, green, blue):
             with three:
                 order = _order([WIDTH * colour + pixel for pixel in range(WIDTH) for colour in range(3)])
                 pixels = builder.shuffle_vector(wide, wide, order)
-                builder.store(
-                    pixels, _address(context, builder, sig.args[0], picture, start, pixels.type), align=1
-                )
+                builder.store(pixels, _address(context, builder, sig.args[0], picture, start, pixels.type), align=1)
             with four:
                 order = _order([WIDTH * colour + pixel for pixel in range(WIDTH) for colour in range(4)])
                 pixels = builder.shuffle_vector(wide, wide, order)

@@ -9,6 +9,7 @@ whoever called decides them and paints them anew.
 import numpy as np
 
 from raytracer.arrays import Tile
+from raytracer.certified import fine_direction, refine
 from raytracer.kernels.bounds import TILE_HEIGHT, TILE_WIDTH
 from raytracer.kernels.compiler import borrowing, inlined
 from raytracer.kernels.lanes import (
@@ -26,7 +27,7 @@ from raytracer.kernels.lanes import (
     store,
 )
 from raytracer.kernels.visibility import STRIDE, list_doubts, see_tile
-from raytracer.shading import cosine, to_byte, towards
+from raytracer.shading import cosine, land, to_byte, towards
 from raytracer.twofold import select
 
 
@@ -156,23 +157,28 @@ def _surface(view, line, k, x, where):
     """The hit points as seen from the eye and from their spheres' centres, and the radii."""
     across, (a1, a0, dx, dy, dz), u, eye = load(view.across, x), line, view.u, view.eye
     t = k / ((across * view.a2 + a1) * across + a0)
-    px, py, pz = t * (across * u[0] + dx), t * (across * u[1] + dy), t * (across * u[2] + dz)
+    cx, cy, cz, radius = _ball(view, where)
+    direction = across * u[0] + dx, across * u[1] + dy, across * u[2] + dz
+    p, n = land(t, direction, (eye[0] - cx, eye[1] - cy, eye[2] - cz), radius)
+    return p, n, radius
+
+
+@inlined
+def _ball(view, where):
+    """Centres and radii of the spheres at these places."""
     if same(where):
-        i, balls = 4 * np.uint64(first_of(where)), view.balls
-        one = np.uint64(1)
-        cx, cy, cz, radius = spread(balls[i]), spread(balls[i + one]), spread(balls[i + one + one]), spread(balls[i + one + one + one])
-    else:
-        cx, cy, cz, radius = gather_rows(view.balls, where)
-    return (px, py, pz), (eye[0] - cx + px, eye[1] - cy + py, eye[2] - cz + pz), radius
+        i, balls = np.uint64(4) * np.uint64(first_of(where)), view.balls
+        cx, cy, cz, radius = balls[i], balls[i + np.uint64(1)], balls[i + np.uint64(2)], balls[i + np.uint64(3)]
+        return spread(cx), spread(cy), spread(cz), spread(radius)
+    return gather_rows(view.balls, where)
 
 
 @inlined
 def _colours(paints, where):
     """The diffuse colours of the spheres at these places."""
     if same(where):
-        i = 4 * np.uint64(paints.material[np.uint64(first_of(where))])
-        colours, one = paints.colours, np.uint64(1)
-        return spread(colours[i]), spread(colours[i + one]), spread(colours[i + one + one]), spread(0.0)
+        i, colours = np.uint64(4) * np.uint64(paints.material[np.uint64(first_of(where))]), paints.colours
+        return spread(colours[i]), spread(colours[i + np.uint64(1)]), spread(colours[i + np.uint64(2)]), spread(0.0)
     return gather_rows(paints.colours, gather(paints.material, where))
 
 
@@ -195,10 +201,41 @@ def _hits_tile(view, scratch, tile, paints, out):
         start = np.uint64((row - out.first_row) * out.width)
         for x in range(tile.left, tile.right, WIDTH):
             across, place, at = load(view.across, x), _place(tile, row, x), start + np.uint64(x)
+            index = load(scratch.index, place)
             t = load(scratch.k, place) / ((across * view.a2 + a1) * across + a0)
+            t = select(is_hit(index), t, np.inf)
             if x + WIDTH <= tile.right:
                 store(out.t, at, t)
-                store(out.index, at, load(scratch.index, place))
+                store(out.index, at, index)
+            else:
+                store(scratch.batch, 0, t)
+                for pixel in range(np.uint64(tile.right - x)):
+                    out.t[at + pixel] = scratch.batch[pixel]
+                    out.index[at + pixel] = scratch.index[place + pixel]
+
+
+@borrowing
+def _fine_hits_tile(view, scratch, tile, fine, out):
+    """t to the last digit, and index; where that is not certain, NaN."""
+    for row in range(tile.top, tile.bottom):
+        a1, a0, _, _, _ = _line(view, row)
+        start, r = np.uint64((row - out.first_row) * out.width), np.uint64(row - out.first_row)
+        for x in range(tile.left, tile.right, WIDTH):
+            across, place, at = load(view.across, x), _place(tile, row, x), start + np.uint64(x)
+            index, low, u, eye = load(scratch.index, place), load(fine.across_low, x), view.u, view.eye
+            t = load(scratch.k, place) / ((across * view.a2 + a1) * across + a0)
+            hit = is_hit(index)
+            if any_of(hit):
+                cx, cy, cz, radius = _ball(view, select(hit, index, spread(largest_of(index))))
+                dx = fine_direction(across, low, u[0], fine.x[r], fine.x_low[r])
+                dy = fine_direction(across, low, u[1], fine.y[r], fine.y_low[r])
+                dz = fine_direction(across, low, u[2], fine.z[r], fine.z_low[r])
+                finer, sure = refine(t, dx, dy, dz, eye[0], eye[1], eye[2], cx, cy, cz, radius)
+                t = select(sure, finer, np.nan)
+            t = select(hit, t, np.inf)
+            if x + WIDTH <= tile.right:
+                store(out.t, at, t)
+                store(out.index, at, index)
             else:
                 store(scratch.batch, 0, t)
                 for pixel in range(np.uint64(tile.right - x)):
@@ -218,3 +255,4 @@ paint_flat = _build(_flat_tile, _fill_tile)
 paint_diffuse = _build(_diffuse_tile, _fill_tile)
 paint_normal = _build(_normal_tile, _fill_tile)
 find_hits = _build(_hits_tile, _no_hits_tile)
+find_fine_hits = _build(_fine_hits_tile, _no_hits_tile)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from raytracer.certified import T_TOLERANCE, contends, inner, look, look_twofold, meet, meet_twofold, nearer, passes
+from raytracer.certified import T_TOLERANCE, contends, inner, look, look_twofold, meet, meet_twofold, nearer, passes, refine
 from raytracer.kernels.compiler import compiled
 
 
@@ -22,6 +22,25 @@ def nearest_given(origins, rays, balls, nearest):
             best[k], _, best_error[k], best_index[k], unsure[k] = nearer(
                 best[k], 0.0, best_error[k], best_index[k], unsure[k], t, 0.0, error, low, i
             )
+
+
+@compiled
+def refine_given(origins, rays, balls, t, index, unsure):
+    """`plain.refine_given`."""
+    left, count = np.empty(len(t), np.int64), 0
+    for k in range(len(t)):
+        i = index[k]
+        if i >= 0 and not unsure[k]:
+            finer, sure = refine(
+                t[k], (rays.x[k], 0.0), (rays.y[k], 0.0), (rays.z[k], 0.0), origins[k, 0], origins[k, 1], origins[k, 2],
+                balls[i, 0], balls[i, 1], balls[i, 2], balls[i, 3],
+            )  # fmt: skip
+            if sure:
+                t[k] = finer
+            else:
+                left[count] = k
+                count += 1
+    return left[:count]
 
 
 @compiled
