@@ -89,7 +89,7 @@ class Candidates(NamedTuple):
 class Sides(NamedTuple):
     """What is known of c = L·L − r² from integers, for some spheres, seen from where all rays start."""
 
-    which: np.ndarray  # type: ignore[assignment]  # int32 (n,), numbers of spheres, ascending
+    which: np.ndarray  # int32 (n,), numbers of spheres, ascending
     c: np.ndarray
     c_low: np.ndarray
     c_error: np.ndarray  # 0 where c is exactly 0: the origin lies on the sphere

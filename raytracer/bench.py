@@ -23,9 +23,10 @@ import numpy as np
 
 from raytracer import peers
 from raytracer.interpreter import interpreter, write_scene
-from raytracer.measure import Lane, _clocked
+from raytracer.measure import Lane, clocked
 from raytracer.methods import CERTIFIED, METHODS
-from raytracer.render import eye_hits, render_scene
+from raytracer.plan import make_plan
+from raytracer.render import draw, eye_hits, render_scene
 from raytracer.scene import Camera, Light, Materials, Scene, Spheres
 from raytracer.stages import STAGES
 from raytracer.trace import ray_intersect_scene
@@ -210,7 +211,7 @@ def calling(work: Callable[[], object]) -> Lane:
     """The lane of something that does the same at each call."""
 
     def lane(turn: int) -> tuple[float, float]:
-        seconds, _ = _clocked(work)
+        seconds, _ = clocked(work)
         return seconds, seconds
 
     return lane
@@ -221,7 +222,7 @@ def drawing(draw: peers.Draw, scene: Scene, size: Size) -> Lane:
     views = cameras(scene)
 
     def lane(turn: int) -> tuple[float, float]:
-        seconds, picture = _clocked(partial(draw, views[turn % len(views)]))
+        seconds, picture = clocked(partial(draw, views[turn % len(views)]))
         return seconds, seconds * pixels(size) / (picture.size // 3)
 
     return lane
@@ -374,8 +375,13 @@ def certainty(effort: Effort, seed: int, progress: Progress) -> Iterator[Section
 
 
 def _unchecked(scene: Scene, size: Size) -> peers.Draw | None:
-    """What draws as `certified` does, but takes float64's word for every decision; None as long as nothing does."""
-    return None
+    """What draws as `certified` does, but takes float64's word for every decision; None where numpy draws."""
+    picture = np.empty((size[1], size[0], 3), np.uint8)
+
+    def draw_view(camera: Camera) -> np.ndarray:
+        return draw(replace(make_plan(replace(scene, camera=camera), "diffuse", *size), unchecked=True), out=picture)
+
+    return draw_view if make_plan(scene, "diffuse", *size).painter else None
 
 
 def hits(effort: Effort, seed: int, progress: Progress) -> Iterator[Section | Check]:
@@ -385,7 +391,7 @@ def hits(effort: Effort, seed: int, progress: Progress) -> Iterator[Section | Ch
     views = [replace(scene, camera=camera) for camera in cameras(scene)]
 
     def lane(turn: int) -> tuple[float, float]:
-        seconds, _ = _clocked(partial(eye_hits, views[turn % len(views)], *effort.size))
+        seconds, _ = clocked(partial(eye_hits, views[turn % len(views)], *effort.size))
         return seconds, seconds
 
     timings = interleaved({"eye_hits": lane}, effort.rounds, effort.seconds)
@@ -420,7 +426,7 @@ def affordable(work: Callable[[int], object], most: int, seconds: float) -> int:
     count = min(256, most)
     work(count)  # may load or compile something
     while count < most:
-        took, _ = _clocked(partial(work, count))
+        took, _ = clocked(partial(work, count))
         if 4 * took > seconds:
             break
         count = min(4 * count, most)
@@ -452,7 +458,7 @@ def parsed(scene: Scene, effort: Effort) -> dict[str, Timing]:
             start = peers.povray_parse_seconds(nothing)
 
             def lane(turn: int) -> tuple[float, float]:
-                wall, seconds = _clocked(partial(peers.povray_parse_seconds, pov))
+                wall, seconds = clocked(partial(peers.povray_parse_seconds, pov))
                 return wall, seconds - start
 
             lanes["POV-Ray"] = lane

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from raytracer import chart
 from raytracer.bench import OURS, Check, Report, Row, Section, named, pixels
-from raytracer.chart import _OTHER, _STYLE, _foot, _head, _machine, _new_figure, _save, _short
+from raytracer.chart import OTHER, STYLE, foot, head, new_figure, save, short
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -42,7 +43,7 @@ def write(folder: Path, report: Report) -> list[Path]:
 def machine() -> str:
     """The processor, its cores, the system, the versions of what computes, and the day."""
     versions = ", ".join(f"{name} {_version(name)}" for name in ("numpy", "numba"))
-    return f"{_machine()}, {versions}, {date.today().isoformat()}"
+    return f"{chart.machine()}, {versions}, {date.today().isoformat()}"
 
 
 def _version(name: str) -> str:
@@ -179,8 +180,8 @@ def draw_chart(stem: Path, report: Report) -> list[Path]:
 
     sections = {section.name: section for section in report.sections}
     by_spheres, by_pixels, names = sections["spheres"], sections["pixels"], competitors(report)
-    with rc_context(_STYLE):
-        chart = _new_figure(12, 6.4, legend=False)
+    with rc_context(STYLE):
+        chart = new_figure(12, 6.4, legend=False)
         left, right = chart.subplots(1, 2, sharey=True)
         _draw_panel(left, by_spheres, [row.spheres for row in by_spheres.rows], names)
         _draw_panel(right, by_pixels, [pixels(row.size) / 1e6 for row in by_pixels.rows if row.size], names)
@@ -190,15 +191,15 @@ def draw_chart(stem: Path, report: Report) -> list[Path]:
         low, high = left.get_ylim()
         left.set_yticks(*zip(*((t, word) for t, word in _TIMES.items() if low <= t <= high), strict=True))
         left.minorticks_off()
-        _head(chart, f"What a picture takes: {_headline(by_spheres)}")
-        _foot(
+        head(chart, f"What a picture takes: {_headline(by_spheres)}")
+        foot(
             chart,
             f"{machine()}.\nMedians of rounds in turns, shaded from quartile to quartile. Dashed: extrapolated from a "
             "smaller picture. Peers trace rays of any origin; ours uses that eye rays share one.",
         )
         _name_lines(left, names)
         _name_lines(right, names)
-        return _save(chart, stem)
+        return save(chart, stem)
 
 
 def competitors(report: Report) -> list[str]:
@@ -223,14 +224,14 @@ def _draw_panel(axes: Axes, section: Section, places: Sequence[float], names: li
         own = [(x, row) for x, row in zip(places, section.rows, strict=True) if row.name == name]
         if own:
             _draw_line(axes, name, own, _colour(name, names))
-    axes.axhline(_FLUENT, color=_OTHER, linewidth=1, linestyle=(0, (1, 2)), zorder=1)
+    axes.axhline(_FLUENT, color=OTHER, linewidth=1, linestyle=(0, (1, 2)), zorder=1)
     axes.text(
-        1, _FLUENT, "60 a second ", transform=axes.get_yaxis_transform(), ha="right", va="bottom", size=8, color=_OTHER
+        1, _FLUENT, "60 a second ", transform=axes.get_yaxis_transform(), ha="right", va="bottom", size=8, color=OTHER
     )
     low, high = min(places), max(places)
     axes.set_xlim(low / 1.3, 1.3 * high * (high / low) ** 0.22)  # room for names
     ticks = sorted(set(places))
-    axes.set_xticks(ticks, [_short(tick) for tick in ticks])
+    axes.set_xticks(ticks, [short(tick) for tick in ticks])
     axes.minorticks_off()
 
 

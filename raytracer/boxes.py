@@ -9,9 +9,9 @@ so U lies between the roots of K₃₃ U² − 2 K₁₃ U + K₁₁ = 0:
 
 and V likewise. Written so, the root's argument does not cancel for small spheres.
 
-A sphere is in front where K₃₃ is well above 0 and z too: then no part of it reaches the plane of the eye. In float64 U
-is off by less than 8u·κ·|n₁||D| from the middle's rounding and 8u·κ·|n₃||D| / (K₃₃ / z²) of the half width from the
-others', both below what is added for them, for frames that magnify errors by no more than `camera.inverse_frame` allows.
+A sphere is in front where K₃₃ is well above 0 and z too: then no part of it reaches the plane of the eye. In float64
+the middle is off by less than 8u·κ·|n₁||D|, and the half width by 8u·κ·|n₃||D| / (K₃₃ / z²) of itself, both below what
+is added for them, for frames that magnify errors by no more than `camera.inverse_frame` allows.
 """
 
 from __future__ import annotations
@@ -54,8 +54,8 @@ class Lens(NamedTuple):
 class Box(NamedTuple):
     """Columns from left to right, rows from top to bottom, ends excluded: whole numbers, and nothing if left ≥ right.
 
-    known: nothing else can see the sphere; else the box may be too small. ahead: above 0 if all of it is in front of the
-    eye, below if all is behind.
+    known: nothing else can see the sphere; else the box may be too small. ahead: above 0 if all of the sphere is in
+    front of the eye, below if all of it is behind.
     """
 
     left: Number

@@ -50,9 +50,9 @@ _COLOURS = {
     "compensated": "#cc79a7",
     "double_double": "#7f5a3c",
 }
-_OTHER = "#777777"
+OTHER = "#777777"
 _MARKERS = {COMPILED: "o", NUMPY: "s"}
-_STYLE: dict[Any, Any] = {
+STYLE: dict[Any, Any] = {
     "svg.hashsalt": "raytracer",
     "font.family": "DejaVu Sans",
     "font.size": 10,
@@ -99,17 +99,17 @@ def draw_charts(folder: Path, scores: list[Score], frames: list[Frame]) -> list[
     """The pictures of what was measured, as PNG and SVG."""
     from matplotlib import rc_context
 
-    with rc_context(_STYLE):
+    with rc_context(STYLE):
         figures = {
             "chart": _draw_speed(scores),
             "chart-families": _draw_families(scores),
             "chart-t": _draw_errors(scores),
             "chart-pictures": _draw_pictures(frames),
         }
-        return [path for name, figure in figures.items() for path in _save(figure, folder / name)]
+        return [path for name, figure in figures.items() for path in save(figure, folder / name)]
 
 
-def _save(figure: Figure, stem: Path) -> list[Path]:
+def save(figure: Figure, stem: Path) -> list[Path]:
     paths = [stem.with_suffix(".png"), stem.with_suffix(".svg")]
     figure.savefig(paths[0], dpi=_DOTS)
     figure.savefig(paths[1], metadata={"Date": None})
@@ -194,7 +194,7 @@ def _quartiles(times: Sequence[float], unit: float) -> tuple[float, float, float
 
 
 def _draw_speed(scores: list[Score]) -> Figure:
-    figure = _new_figure(13, 8.6)
+    figure = new_figure(13, 8.6)
     ordinary = [name for name, family in FAMILIES.items() if family.ordinary and any(s.family == name for s in scores)]
     panels = [(f"{name.capitalize()} rays", _points_of_family(scores, name)) for name in ordinary]
     stress = _points_of_stress(scores)
@@ -206,11 +206,11 @@ def _draw_speed(scores: list[Score]) -> Figure:
         heights = _draw_against(axes, points, "nanoseconds for one ray and one sphere", _WRONG, True)
         axes.set_title(f"{title}:\n{_verdict(points)}")
         drawn.append((axes, points, heights))
-    _head(figure, "What a certain decision costs, and what the usual ones get wrong")
+    head(figure, "What a certain decision costs, and what the usual ones get wrong")
     _legend(figure)
-    _foot(
+    foot(
         figure,
-        f"{_machine()}. One thread; one call with thousands of rays, all it does included; time to compile left out. "
+        f"{machine()}. One thread; one call with thousands of rays, all it does included; time to compile left out. "
         "Ordinary: median of the rounds, line from quartile to quartile.\nMade to break: mean over the families, line "
         "from the fastest to the slowest. Wrong: hit or miss, which sphere, or which root, against exact integers.",
     )
@@ -255,7 +255,7 @@ def _draw_against(axes: Axes, points: list[Point], cost: str, wrong: str, sample
     axes.set_xlabel(cost)
     axes.set_ylabel(wrong)
     _plain_ticks(axes)
-    axes.set_yticks([shelf, *axes_ticks(bound)], ["none", *(_short(tick) for tick in axes_ticks(bound))])
+    axes.set_yticks([shelf, *axes_ticks(bound)], ["none", *(short(tick) for tick in axes_ticks(bound))])
     axes.minorticks_off()
     return heights
 
@@ -463,7 +463,7 @@ def _draw_families(scores: list[Score]) -> Figure:
     families = [name for name in FAMILIES if any(s.family == name for s in scores)]
     backend = scores[0].racer.backend
     found = {(s.racer.method, s.family): s for s in scores if s.racer.backend == backend}
-    figure = _new_figure(15, 11.2, legend=False)
+    figure = new_figure(15, 11.2, legend=False)
     above, below = figure.subplots(2, 1)
     wrong = [[1e6 * found[m, f].wrong / found[m, f].rays for f in families] for m in methods]
     costs = [[_quartiles(found[m, f].times, 1e9)[0] for f in families] for m in methods]
@@ -473,8 +473,8 @@ def _draw_families(scores: list[Score]) -> Figure:
     what = f"in no family wrong: {', '.join(certain) or 'no method'}"
     above.set_title(f"Wrong decisions per million rays; an empty field is none. {what.capitalize()}")
     below.set_title(f"Nanoseconds for one ray and one sphere, {backend}")
-    _head(figure, "Where each method fails, and where being right costs")
-    _foot(figure, f"{_machine()}. {_count_rays(scores)} {_same_on_backends(scores)}")
+    head(figure, "Where each method fails, and where being right costs")
+    foot(figure, f"{machine()}. {_count_rays(scores)} {_same_on_backends(scores)}")
     return figure
 
 
@@ -492,7 +492,7 @@ def _draw_cells(
     axes.imshow(shade, cmap=colours, norm=LogNorm(low, high), aspect="auto")
     for (y, x), value in np.ndenumerate(values):
         dark = value > 0 and (log10(value) - log10(low)) / (log10(high) - log10(low)) > 0.62
-        axes.text(x, y, _short(value) if value else "", ha="center", va="center", size=8.5,
+        axes.text(x, y, short(value) if value else "", ha="center", va="center", size=8.5,
                   color="white" if dark else "#333333")  # fmt: skip
     axes.set_yticks(range(len(rows)), rows)
     axes.set_xticks(range(len(columns)), [name.replace(" ", "\n", 1) for name in columns], size=8.5)
@@ -515,7 +515,7 @@ def _draw_errors(scores: list[Score]) -> Figure:
     )
     places = [place for place in (ordinary, STRESS) if place and any(s.family == place for s in scores)]
     backend = scores[0].racer.backend
-    figure = _new_figure(13, 4.9 * len(places))
+    figure = new_figure(13, 4.9 * len(places))
     grid = figure.subplots(len(places), 2, squeeze=False, sharey=True)
     for row, place in zip(grid, places, strict=True):
         own = [s for s in scores if s.family == place and s.racer.backend == backend][::-1]
@@ -527,10 +527,10 @@ def _draw_errors(scores: list[Score]) -> Figure:
         row[0].set_xlabel("ulps of float64")
         row[1].set_xlabel("|Δt| · |D| / r; 10⁻³ is a thousandth of the sphere's radius")
     _legend_of_summaries(figure)
-    _head(figure, "A right decision can still have a wrong t: what a sum that cancels costs in digits")
-    _foot(
+    head(figure, "A right decision can still have a wrong t: what a sum that cancels costs in digits")
+    foot(
         figure,
-        f"{_machine()}. Over the rays whose decisions are right, so that a method that is wrong often is judged by its "
+        f"{machine()}. Over the rays whose decisions are right, so that a method that is wrong often is judged by its "
         f"better rays only. {_same_on_backends(scores)}",
     )
     return figure
@@ -593,7 +593,7 @@ def _draw_pictures(frames: list[Frame]) -> Figure:
     count = len({frame.scene for frame in hard})
     panels = [(ORDINARY_SCENE.stem, ordinary)] * bool(ordinary)
     panels += [(f"{count} hard scene{'s' * (count != 1)}, together", hard)] * bool(hard)
-    figure = _new_figure(13, 6.6 * len(panels))
+    figure = new_figure(13, 6.6 * len(panels))
     grid, drawn = figure.subplots(len(panels), 2, squeeze=False), []
     for row, (title, own) in zip(grid, panels, strict=True):
         for axes, of_bytes in zip(row, (False, True), strict=True):
@@ -605,10 +605,10 @@ def _draw_pictures(frames: list[Frame]) -> Figure:
             axes.set_title(f"{title},\nno wrong {word}: {_some(right)}")
     side = round(frames[0].pixels ** 0.5)
     _legend(figure)
-    _head(figure, "Whole pictures: what shading and boxes leave of the cost, and what rounding leaves of the picture")
-    _foot(
+    head(figure, "Whole pictures: what shading and boxes leave of the cost, and what rounding leaves of the picture")
+    foot(
         figure,
-        f"{_machine()}. Stage diffuse, {side}×{side} pixels, all cores, from plan to bytes; time to compile left out. "
+        f"{machine()}. Stage diffuse, {side}×{side} pixels, all cores, from plan to bytes; time to compile left out. "
         "A pixel is wrong if it shows another shape than certified's.\nMedian of the rounds, line from quartile to "
         "quartile; for several scenes the mean.",
     )
@@ -659,7 +659,7 @@ def _times(times: Sequence[float], unit: str) -> list[str]:
 # Small things
 
 
-def _new_figure(width: float, height: float, legend: bool = True) -> Figure:
+def new_figure(width: float, height: float, legend: bool = True) -> Figure:
     """With margins, in inches, for the head and a legend above, and two lines of notes below."""
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
@@ -669,11 +669,11 @@ def _new_figure(width: float, height: float, legend: bool = True) -> Figure:
     return Figure(figsize=(width, height), dpi=_DOTS, layout=layout)
 
 
-def _head(figure: Figure, text: str) -> None:
+def head(figure: Figure, text: str) -> None:
     figure.text(0.012, 1 - 0.12 / figure.get_figheight(), text, size=15, weight="bold", va="top", color="#111111")
 
 
-def _foot(figure: Figure, text: str) -> None:
+def foot(figure: Figure, text: str) -> None:
     figure.text(0.012, 0.09 / figure.get_figheight(), text, size=8.5, va="bottom", color="#666666")
 
 
@@ -684,10 +684,10 @@ def _plain_ticks(axes: Axes) -> None:
     ticks = [tick for tick in ticks if low <= tick <= high]
     if len(ticks) > 9:
         ticks = [tick for tick in ticks if f"{tick:e}"[0] in ("125" if len(ticks) < 15 else "1")]
-    axes.set_xticks(ticks, [_short(tick) for tick in ticks])
+    axes.set_xticks(ticks, [short(tick) for tick in ticks])
 
 
-def _short(value: float) -> str:
+def short(value: float) -> str:
     """Three letters or so: 0.5, 17, 3.2k, 41k, 1M."""
     for unit, letter in ((1e6, "M"), (1e3, "k"), (1.0, "")):
         if value >= 0.9995 * unit:
@@ -697,14 +697,14 @@ def _short(value: float) -> str:
 
 
 def _colour(method: str) -> str:
-    return _COLOURS.get(method.removesuffix("32"), _OTHER)
+    return _COLOURS.get(method.removesuffix("32"), OTHER)
 
 
 def _is_single(method: str) -> bool:
     return method in METHODS and METHODS[method].precision is np.float32
 
 
-def _machine() -> str:
+def machine() -> str:
     """The processor's name, and how many cores."""
     name = platform.processor() or platform.machine()
     try:

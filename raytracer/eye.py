@@ -81,7 +81,7 @@ class Eye(NamedTuple):
         components = zip(self.grid.u, fine_rows(self.raster, rows), strict=True)
         x, y, z = (fine_direction(across[xs], low[xs], u, rest[ys], rest_low[ys]) for u, (rest, rest_low) in components)
         balls = self.targets.balls[hits.index[which]]
-        t, sure = refine(hits.t[which], x, y, z, *self.origin, *xyz(balls), balls[:, 3])
+        t, sure = refine(hits.t[which], x, y, z, *xyz(self.origin), *xyz(balls), balls[:, 3])
         hits.t[which] = np.where(sure, t, hits.t[which])
         left = which.copy()
         left[which] = ~sure

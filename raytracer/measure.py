@@ -248,7 +248,7 @@ def _time_bundle(racer: Racer, some: list[Bundle], checked: Hits, rays: int, tur
     many = replace(
         bundle, origins=np.tile(bundle.origins, (times, 1)), directions=np.tile(bundle.directions, (times, 1))
     )
-    seconds, hits = _clocked(partial(trace, racer, many))
+    seconds, hits = clocked(partial(trace, racer, many))
     expected = slice(turn * size, (turn + 1) * size)
     _refuse_change(racer, hits.t, np.tile(checked.t[expected], times))
     _refuse_change(racer, hits.index, np.tile(checked.index[expected], times))
@@ -299,7 +299,7 @@ def _score_scene(scene: Scene, name: str, effort: Effort) -> list[Frame]:
 def _time_frame(
     racer: Racer, scene: Scene, size: int, pictures: dict[Racer, np.ndarray], turn: int
 ) -> tuple[float, float]:
-    seconds, picture = _clocked(lambda: draw(plan_on(scene, racer, size)))
+    seconds, picture = clocked(lambda: draw(plan_on(scene, racer, size)))
     _refuse_change(racer, picture, pictures.setdefault(racer, picture))
     return seconds, seconds
 
@@ -316,7 +316,7 @@ def _index(plan: Plan) -> np.ndarray:
         return hits_of(plan, tracer).index
 
 
-def _clocked(work: Callable[[], Result]) -> tuple[float, Result]:
+def clocked(work: Callable[[], Result]) -> tuple[float, Result]:
     """Seconds, and what was done in them; without the collector of garbage that others left."""
     gc.disable()
     start = perf_counter()

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from raytracer.arrays import Balls, Candidates, First, Grid, Nearest, Rays, Seen, Sides, TwofoldRays, UsualRays
+from raytracer.arrays import Balls, Candidates, First, Grid, Nearest, Rays, Seen, Sides, TwofoldRays, UsualRays, View
 from raytracer.boxes import Lens, box_of
 from raytracer.camera import squares
 from raytracer.certified import (
@@ -29,6 +29,7 @@ from raytracer.certified import (
     refine,
 )
 from raytracer.methods import METHODS, Vector
+from raytracer.twofold import select
 
 
 def bound(lens: Lens, origin: np.ndarray, balls: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -45,7 +46,7 @@ def bound(lens: Lens, origin: np.ndarray, balls: np.ndarray) -> tuple[np.ndarray
     return sides.astype(np.int32), front
 
 
-def see(grid: Grid, kappa: float, origin: np.ndarray, balls: np.ndarray, front: np.ndarray) -> Seen:
+def see(grid: Grid | View, kappa: float, origin: np.ndarray, balls: np.ndarray, front: np.ndarray) -> Seen:
     """All spheres (s, 4), x, y, z, radius, as seen from one origin (3,).
 
     front is what `bound` says; kappa is κ (see `certified`), or 0 where that is not known or too large for `approach`.
@@ -55,9 +56,10 @@ def see(grid: Grid, kappa: float, origin: np.ndarray, balls: np.ndarray, front: 
     square = inner(x, y, z, x, y, z) + radii * radii
     edge = np.where(front, edge_of(c, square, grid.reach, kappa), 0.0)
     _, _, _, _, _, _, fine_c, _, c_error, size = look_twofold(*eye, *places, radii, np.nan, 0.0, 0.0)
+    c = select(edge > 0.0, c, fine_c)
     return Seen(
         x, y, z, inner(*grid.u, x, y, z), inner(*grid.v, x, y, z), -inner(*grid.back, x, y, z),
-        np.where(edge > 0.0, c, fine_c), U * abs(fine_c) + c_error, size, radii, edge,
+        c, U * abs(fine_c) + c_error, size, radii, edge,
     )  # fmt: skip
 
 
@@ -134,7 +136,8 @@ def nearest_twofold(
         open_ = contends(*rough, nearest.t[some], nearest.error[some]) & ~twin
         some, directions = some[open_], TwofoldRays._make(array[open_] for array in directions)
         if some.size:
-            seen = look_twofold(*xyz(origins[some]), *ball, *known_sides(sides, np.array(i)))
+            centre, known = xyz(ball), known_sides(sides, np.array(i))
+            seen = look_twofold(*xyz(origins[some]), *centre, ball[3], *known)
             so_far = nearest.t[some], t_low[some], nearest.error[some], nearest.index[some], nearest.unsure[some]
             found = nearer(*so_far, *meet_twofold(*seen, *directions), i)
             for array, value in zip((nearest.t, t_low, *nearest[1:]), found, strict=True):
@@ -200,7 +203,7 @@ def usual_given(
 
 
 def polish(origins: np.ndarray, rays: TwofoldRays, balls: np.ndarray, known: tuple[np.ndarray, ...]) -> np.ndarray:
-    """t of rays (n,), each against its own sphere (n, 4), to the last digit; +inf where two-fold arithmetic is not certain.
+    """t of rays (n,), each against its own sphere (n, 4), to the last digit; +inf where that is not certain.
 
     known is what `known_sides` says of those spheres.
     """

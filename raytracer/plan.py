@@ -30,6 +30,7 @@ class Plan:
     method: str
     lights: tuple[Light, ...]
     forced: ModuleType | None = None  # who traces, if it is not to be chosen
+    unchecked: bool = False  # paint `diffuse` without certainty, to measure what that costs
 
     @cached_property
     def eye(self) -> Eye:
@@ -59,7 +60,8 @@ class Plan:
     @cached_property
     def painter(self) -> str:
         """The kernel that paints the whole stage, or nothing if numpy does."""
-        return self.stage.painter if self.on_screen and not self._has_far_lights else ""
+        painter = self.stage.painter if self.on_screen and not self._has_far_lights else ""
+        return f"{painter}_unchecked" if painter and self.unchecked else painter
 
     @property
     def _has_far_lights(self) -> bool:
@@ -107,7 +109,7 @@ def _lights_that_matter(scene: Scene) -> tuple[Light, ...]:
 
 
 def _reasons(plan: Plan) -> Iterator[str]:
-    scene, stage, lights = plan.scene, plan.stage, plan.lights
+    scene, stage = plan.scene, plan.stage
     yield f"stage {plan.name}: {stage.about}"
     if stage.needs_hits:
         yield from _reasons_for_tracing(plan)
@@ -115,13 +117,7 @@ def _reasons(plan: Plan) -> Iterator[str]:
         yield "no ray is shot: the boxes of pixels that can see a sphere are all that is counted"
     if not stage.needs_normals:
         yield "no point, no normal: this stage asks only what is hit"
-    if not stage.needs_lights:
-        if scene.lights:
-            yield f"{_count(scene.lights, 'light')} given, not used by this stage"
-    elif len(lights) < len(scene.lights):
-        yield f"{_count(lights, 'light')} of {len(scene.lights)} shaded: the rest is black"
-    else:
-        yield f"{_count(lights, 'light')} shaded, one after the other"
+    yield from _reasons_for_lights(plan)
     table = scene.materials.table
     for columns, word in ((table[:, 3:6], "ambient"), (table[:, 6:9], "specular"), (table[:, 10], "k_refl")):
         if columns.any():
@@ -132,6 +128,17 @@ def _reasons(plan: Plan) -> Iterator[str]:
         yield "each ray is traced twice, by the method and for the truth: this stage compares them"
     if stage.needs_whole:
         yield "the whole picture's hits are kept: this stage compares pixels with each other"
+
+
+def _reasons_for_lights(plan: Plan) -> Iterator[str]:
+    given, lights = plan.scene.lights, plan.lights
+    if not plan.stage.needs_lights:
+        if given:
+            yield f"{_count(given, 'light')} given, not used by this stage"
+    elif len(lights) < len(given):
+        yield f"{_count(lights, 'light')} of {len(given)} shaded: the rest is black"
+    else:
+        yield f"{_count(lights, 'light')} shaded, one after the other"
 
 
 def _reasons_for_tracing(plan: Plan) -> Iterator[str]:

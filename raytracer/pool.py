@@ -36,7 +36,7 @@ def share(
 ) -> None:
     """Do work(job, worker) for all jobs, in about their order, on so many threads (default: one a core).
 
-    The calling thread is one of them, and worker 0. It is also the one that calls finished(result), soon after each job.
+    The calling thread is one of them, and worker 0. It is also the one that calls finished(result), soon after a job.
     The first exception ends it all, once the jobs that are being done have ended, and is raised.
     """
     workers = max(1, min(threads or cores(), len(jobs)))

@@ -19,9 +19,11 @@ from raytracer.image import to_bytes
 from raytracer.methods import CERTIFIED
 from raytracer.plan import Plan, make_plan
 from raytracer.pool import share
-from raytracer.scene import Scene
-from raytracer.screen import Pixels, Screen, make_canvas, make_paints, open_screen
+from raytracer.scene import Camera, Light, Materials, Scene, Spheres
+from raytracer.screen import SPARE, Pixels, Screen, make_canvas, make_paints, open_screen
 from raytracer.stages import Block, Whole
+
+_GREY = Materials(np.full((1, 11), 0.5))
 
 Progress = Callable[[int, int, slice], object]
 
@@ -72,7 +74,7 @@ def draw(
         watch = Watch(threads, progress, cancelled, rounds=2 if plan.stage.needs_whole else 1)
         if plan.painter:
             assert isinstance(tracer, Screen)
-            _paint(plan, tracer, picture, watch)
+            (_paint_whole if plan.stage.needs_whole else _paint)(plan, tracer, picture, watch)
         else:
             whole = whole_of(plan, tracer, watch)
             share_bands(
@@ -142,6 +144,26 @@ def _paint(plan: Plan, screen: Screen, picture: np.ndarray, watch: Watch) -> Non
         decide(doubtful)
 
 
+def _paint_whole(plan: Plan, screen: Screen, picture: np.ndarray, watch: Watch) -> None:
+    """A stage that a kernel paints from the hits of the whole picture."""
+    paints, canvas, hits = make_paints(plan, screen), make_canvas(picture), screen.room_for_hits()
+    width, shape = plan.raster.width, (plan.raster.height, plan.raster.width)
+    t, index = (array[:-SPARE].reshape(shape) for array in hits)
+
+    def find(rows: slice, worker: int) -> slice:
+        screen.find(Hits(t[rows], index[rows]), rows, worker)
+        return slice(rows.start, rows.start)
+
+    def paint(rows: slice, worker: int) -> slice:
+        scratch, _ = screen.desks[worker]
+        painter(*hits, near, far, rows.start, rows.stop, width, scratch, paints, canvas)
+        return rows
+
+    share_bands(screen, plan, watch, find)
+    painter, (near, far) = getattr(plan.path, plan.painter), screen.range_of(t, index)
+    share_bands(screen, plan, watch, paint)
+
+
 def _draw_rows(
     plan: Plan, tracer: Eye | Screen, rows: slice, worker: int, whole: Whole | None, picture: np.ndarray
 ) -> slice:
@@ -209,13 +231,20 @@ def eye_hits(
 def warm_up(scene: Scene, stage: str, method: str = CERTIFIED) -> bool:
     """Have the kernels ready that a picture needs, machine code and all; False if there is no compiler.
 
-    To make machine code takes seconds, once. The backend does not learn of the kernels from this, and draws without them
-    in the meantime.
+    To make machine code takes seconds, once. The backend does not learn of the kernels from this, and draws without
+    them in the meantime.
     """
     kernels = backend.import_kernels()
     if kernels is not None:
-        draw(make_plan(scene, stage, 16, 16, method=method, path=kernels))
+        for each in (scene, _twins(scene.camera)):
+            draw(make_plan(each, stage, 16, 16, method=method, path=kernels))
     return kernels is not None
+
+
+def _twins(camera: Camera) -> Scene:
+    """A scene that takes all levels of certainty: two equal spheres, and the eye within both."""
+    spheres = Spheres(np.ones(2), np.array([camera.eye] * 2), np.zeros(2, np.int32), np.arange(2, dtype=np.int32))
+    return Scene(camera, lights=(Light(camera.eye, (1.0, 1.0, 1.0)),), materials=_GREY, spheres=spheres)
 
 
 def _no_hits(rows: slice, width: int) -> Hits:

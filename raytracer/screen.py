@@ -35,6 +35,7 @@ from raytracer.shading import to_byte
 from raytracer.stages import light_from_eye
 from raytracer.units import sphere_units
 
+SPARE = 8  # elements at the end of arrays that are read eight at a time
 _SPARE = 32  # list entries beyond the last that a kernel may look at
 _DOUBTS = 1 << 15  # pixels that a thread lists before they are decided
 _FEW = 1 << 13  # spheres below which one thread sorts them sooner than two
@@ -104,6 +105,7 @@ class Screen(NamedTuple):
     slow: Slow
     bins: Bins
     targets: Targets
+    workspace: Workspace
     desks: list[
         tuple[Scratch, np.ndarray]
     ]  # of each thread, and its list of doubtful pixels, which begins with a length
@@ -134,7 +136,7 @@ class Screen(NamedTuple):
         return self.in_scene(hits)
 
     @_NOT_A_NUMBER_IS_NO_ERROR
-    def find(self, hits: Hits, rows: slice, worker: int, polished: bool) -> None:
+    def find(self, hits: Hits, rows: slice, worker: int, polished: bool = False) -> None:
         """`hits`, into arrays, in units, and with numbers of spheres."""
         out = HitRows(hits.t.reshape(-1), hits.index.reshape(-1), rows.start, self.raster.width)
         kernel, paints = ("find_fine_hits", self._fine_rays(rows)) if polished else ("find_hits", _NO_PAINTS)
@@ -146,6 +148,16 @@ class Screen(NamedTuple):
             some = Hits(hits.t[ys, xs], hits.index[ys, xs])
             polish(some, (np.arange(len(xs)),), Pixels(self, xs, ys + rows.start), self.targets)
             hits.t[ys, xs] = some.t
+
+    def room_for_hits(self) -> Hits:
+        """Flat arrays for the hits of all pixels, and some elements to spare."""
+        size = self.raster.height * self.raster.width + SPARE
+        return Hits(self.workspace.array(size, np.float64, "t"), self.workspace.array(size, np.int32, "hit"))
+
+    def range_of(self, t: np.ndarray, index: np.ndarray) -> tuple[float, float]:
+        """The smallest and the largest t of all hits."""
+        near, far = self.kernels.range_of(t.reshape(-1), index.reshape(-1))
+        return near, far
 
     def _fine_rays(self, rows: slice) -> FineRays:
         _, low = fine_columns(self.raster)
@@ -217,7 +229,7 @@ def open_screen(scene: Scene, raster: Raster, kernels: ModuleType, threads: int 
         slow, targets = _slow(lens, view, origin, balls, slow_ids, kernels, bins)
         desks = [_desk(workspace, kernels, worker) for worker in range(threads or cores())]
         order = scene.spheres.order if len(scene.triangles) and len(scene.spheres) else None
-        yield Screen(raster, unit, origin, len(scene.spheres), order, view, slow, bins, targets, desks)
+        yield Screen(raster, unit, origin, len(scene.spheres), order, view, slow, bins, targets, workspace, desks)
 
 
 def make_paints(plan: Plan, screen: Screen) -> Paints:

@@ -109,13 +109,14 @@ def _settle_exactly(found: Nearest, bundle: Bundle, candidates: Candidates, targ
     cuts = np.searchsorted(pairs, np.arange(_CHUNK, pairs[-1], _CHUNK))
     for some in np.split(open_rays, np.unique(cuts)):
         contend = _contenders(bundle, candidates.of(some), some, targets)
-        balls = targets.balls[contend.ids].tolist()
-        origins, starts, ids = bundle.origins[some].tolist(), contend.starts.tolist(), contend.ids.tolist()
-        for k, origin, start, end in zip(some.tolist(), origins, starts, starts[1:], strict=False):
-            direction, unit = bundle.exact_direction(k)
-            lengths = [*origin, *(number for ball in balls[start:end] for number in ball)]
-            found.t[k], i = exact.nearest_of(lengths, direction, unit)
-            found.index[k] = ids[start + i] if i >= 0 else -1
+        lengths, ids = targets.balls[contend.ids].ravel().tolist(), contend.ids.tolist()
+        starts, ts, indices = contend.starts.tolist(), [], []
+        rays = zip(some.tolist(), bundle.origins[some].tolist(), starts, starts[1:], strict=False)
+        for k, origin, start, end in rays:
+            t, i = exact.nearest_of(origin + lengths[4 * start : 4 * end], *bundle.exact_direction(k))
+            ts.append(t)
+            indices.append(ids[start + i] if i >= 0 else -1)
+        found.t[some], found.index[some] = ts, indices
 
 
 def _contenders(bundle: Bundle, candidates: Candidates, some: np.ndarray, targets: Targets) -> Candidates:

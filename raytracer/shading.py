@@ -14,6 +14,7 @@ from raytracer.twofold import Number, select
 Three = tuple[Number, Number, Number]
 
 _SMALL_STEP = 2.0**-20
+_FARTHEST_GREY = 0.15
 
 
 def land(t: Number, d: Three, away: Three, radius: Number) -> tuple[Three, Three]:
@@ -36,6 +37,13 @@ def towards(p: Three, n: Three, light: Three) -> tuple[Number, Number]:
 def cosine(facing: Number, square: Number, radius: Number) -> Number:
     """max(0, N·L) from what `towards` says, n = r·N; 0 where the light is at the point."""
     return select(facing > 0.0, facing / (radius * np.sqrt(square)), 0.0)
+
+
+def grey_of(t: Number, near: float, far: float) -> Number:
+    """Linear in 1 / t: 1 where t = near, and darker up to t = far."""
+    if near < far:
+        return _FARTHEST_GREY + (1.0 - _FARTHEST_GREY) * ((near / t - near / far) / (1.0 - near / far))
+    return 0.0 * (near / t) + 1.0
 
 
 def to_byte(colour: Number) -> Number:

@@ -21,7 +21,6 @@ from raytracer.units import sphere_units
 DUMMY = (0.8, 0.2, 0.3)
 BLACK, WHITE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
 _TOO_DARK = 0.1  # a background with no channel above this does not show black
-_FARTHEST_GREY = 0.15
 
 Scale = tuple[tuple[float, Colour], ...]  # numbers, ascending, and the colours that stand for them
 
@@ -58,6 +57,7 @@ class Block:
     def _directions(self) -> Vectors:
         grid = eye_grid(self.raster)
         if self.columns is None:
+            assert isinstance(self.rows, slice)
             return directions(grid, self.rows)
         return directions_of(grid, grid.across[self.columns], grid.up[self.rows])
 
@@ -187,9 +187,7 @@ def depth(block: Block) -> np.ndarray:
     """Linear in 1 / t, so that a near object and a far horizon both show; t counts along the view's axis."""
     assert block.whole is not None
     near, far = block.whole.range
-    t = block.hits.t[block.hit]
-    nearness = (near / t - near / far) / (1 - near / far) if near < far else np.ones_like(t)
-    grey = _FARTHEST_GREY + (1 - _FARTHEST_GREY) * nearness
+    grey = shading.grey_of(block.hits.t[block.hit], near, far)
     return block.paint(grey[:, None], elsewhere=BLACK)
 
 
@@ -289,7 +287,7 @@ class Stage:
     needs_truth: bool = False  # compares the method's hits with the true ones
     needs_tests: bool = False  # counts how many spheres a pixel is tested against
     legend: tuple[tuple[tuple[float, float, float], str], ...] = ()  # what its colours mean
-    painter: str = ""  # a kernel that paints the same bytes, for a stage that has one
+    painter: str = ""  # a kernel that paints the same bytes, of tiles or, if it needs them, of the whole picture's hits
     flat: Callable[[Scene], tuple[Colour, Colour]] = background  # what it paints: the one colour of hits, the rest
 
 
@@ -309,8 +307,12 @@ STAGES = {
         "n", normal, "the normal (x, y, z) as red, green, blue: −1 is 0, 1 is full", needs_normals=True,
         painter="paint_normal", flat=black,
     ),
-    "depth": Stage("z", depth, "near is white, far is grey, nothing is black", needs_whole=True),
-    "edges": Stage("e", edges, "the borders between different shapes", needs_whole=True),
+    "depth": Stage(
+        "z", depth, "near is white, far is grey, nothing is black", needs_whole=True, painter="paint_depth", flat=black
+    ),
+    "edges": Stage(
+        "e", edges, "the borders between different shapes", needs_whole=True, painter="paint_edges", flat=black
+    ),
     "cost": Stage(
         "k", cost, "how many spheres each pixel is tested against", needs_hits=False, needs_tests=True,
         legend=TESTS_LEGEND,

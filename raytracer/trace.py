@@ -84,7 +84,11 @@ class GivenRays(NamedTuple):
 
     def hits(self) -> Hits:
         """What they hit, t to the last digit."""
-        nearest, rays, (balls, _, path) = Nearest.nothing_yet((len(self.origins),)), given_rays(self.directions), self.targets
+        nearest, rays, (balls, _, path) = (
+            Nearest.nothing_yet((len(self.origins),)),
+            given_rays(self.directions),
+            self.targets,
+        )
         if self.tree is None:
             path.nearest_given(self.origins, rays, balls, nearest)
         else:
@@ -103,7 +107,9 @@ class GivenRays(NamedTuple):
         if self.tree is None:
             return Candidates.all(len(which[0]), len(self.targets.balls))
         rays = given_rays(self.directions[which])
-        return Candidates(*self.targets.path.candidates_in_tree(self.origins[which], rays, self.targets.balls, self.tree))
+        return Candidates(
+            *self.targets.path.candidates_in_tree(self.origins[which], rays, self.targets.balls, self.tree)
+        )
 
 
 def _vectors(name: str, vectors: np.ndarray) -> np.ndarray:

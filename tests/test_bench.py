@@ -435,7 +435,7 @@ def test_all_files_are_written(report, tmp_path):
 
 def test_the_chart_has_a_line_for_each_competitor(report, monkeypatch, tmp_path):
     kept = []
-    monkeypatch.setattr(bench_chart, "_save", lambda figure, stem: kept.append(figure) or [])
+    monkeypatch.setattr(bench_chart, "save", lambda figure, stem: kept.append(figure) or [])
     bench_chart.draw_chart(tmp_path / "bench", report)
     for axes, name in zip(kept[0].axes, ("spheres", "pixels"), strict=True):
         lines = {line.get_label(): line for line in axes.lines}

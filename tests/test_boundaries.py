@@ -92,9 +92,7 @@ def test_machine_code_is_kept_elsewhere_where_the_package_cannot_be_written_to(t
         "    if 'kernels' in self.parts: raise PermissionError\n"
         "    mkdir(self, *rest, **more)\n"
         "pathlib.Path.mkdir = refuse\n"
-        f"pathlib.Path.expanduser = lambda self: pathlib.Path({str(tmp_path)!r})\n"
-        + A_KERNEL
-        + "\n"
+        f"pathlib.Path.expanduser = lambda self: pathlib.Path({str(tmp_path)!r})\n" + A_KERNEL + "\n"
         f"print(len(list(pathlib.Path({str(tmp_path)!r}).rglob('*.nbi'))) > 0)\n"
     )
     assert in_a_fresh_process(code) == "2.0\nTrue\n"

@@ -5,10 +5,18 @@ from raytracer.kernels.compiler import cache_named_after_sources
 with cache_named_after_sources():
     from raytracer.kernels.bounds import TILE_HEIGHT, TILE_WIDTH, begin, bound, fill
     from raytracer.kernels.bvh import along_curve, build, candidates_in_tree, nearest_in_tree
-    from raytracer.kernels.tiles import find_fine_hits, find_hits, paint_diffuse, paint_flat, paint_normal
+    from raytracer.kernels.tiles import (
+        find_fine_hits,
+        find_hits,
+        paint_diffuse,
+        paint_diffuse_unchecked,
+        paint_flat,
+        paint_normal,
+    )
     from raytracer.kernels.trace import nearest_given, nearest_twofold, polish, refine_given
     from raytracer.kernels.usual import usual_eye, usual_given
     from raytracer.kernels.visibility import STRIDE, candidates
+    from raytracer.kernels.whole import paint_depth, paint_edges, range_of
 
 __all__ = [
     "STRIDE",
@@ -26,10 +34,14 @@ __all__ = [
     "nearest_given",
     "nearest_in_tree",
     "nearest_twofold",
+    "paint_depth",
     "paint_diffuse",
+    "paint_diffuse_unchecked",
+    "paint_edges",
     "paint_flat",
     "paint_normal",
     "polish",
+    "range_of",
     "refine_given",
     "usual_eye",
     "usual_given",

@@ -1,6 +1,6 @@
 """A tree of boxes about many spheres, for rays that share nothing.
 
-Spheres are sorted along a curve that fills space (G. Morton, 1966), and cut into eights, and these into eights of eights:
+Spheres are sorted along a curve that fills space (G. Morton, 1966) and cut into eights, these into eights of eights:
 
     level 0    box of spheres 0…7 | 8…15 | …          a box's children lie side by side, so there are no pointers,
     level 1    box of boxes 0…7   | …                 and one ray is tested against all eight of them at once
@@ -193,13 +193,13 @@ def _maybe_hit(tree, ray, first):
     (ox, oy, oz), (dx, dy, dz), _, a, m = ray
     size, at = np.uint64(len(tree.ids)), np.uint64(first)
     cx, cy, cz = load(tree.spheres, at), load(tree.spheres, at + size), load(tree.spheres, at + size + size)
-    lx, ly, lz, c, c_error, l = look(ox, oy, oz, cx, cy, cz, load(tree.spheres, at + size + size + size))
-    missed = passes(inner(dx, dy, dz, lx, ly, lz), a, c, c_error, m * l, m)
+    lx, ly, lz, c, c_error, distance = look(ox, oy, oz, cx, cy, cz, load(tree.spheres, at + size + size + size))
+    missed = passes(inner(dx, dy, dz, lx, ly, lz), a, c, c_error, m * distance, m)
     return bits_of(missed) ^ np.uint8(255)
 
 
 @inlined
 def _meet(ray, balls, i):
     (ox, oy, oz), (dx, dy, dz), _, a, m = ray
-    lx, ly, lz, c, c_error, l = look(ox, oy, oz, balls[i, 0], balls[i, 1], balls[i, 2], balls[i, 3])
-    return meet(inner(dx, dy, dz, lx, ly, lz), a, c, c_error, l, balls[i, 3], m, T_TOLERANCE)
+    lx, ly, lz, c, c_error, distance = look(ox, oy, oz, balls[i, 0], balls[i, 1], balls[i, 2], balls[i, 3])
+    return meet(inner(dx, dy, dz, lx, ly, lz), a, c, c_error, distance, balls[i, 3], m, T_TOLERANCE)

@@ -26,17 +26,17 @@ from raytracer.kernels.lanes import (
     spread,
     store,
 )
-from raytracer.kernels.visibility import STRIDE, list_doubts, see_tile
+from raytracer.kernels.visibility import STRIDE, list_doubts, see_tile, see_tile_unchecked
 from raytracer.shading import cosine, land, to_byte, towards
 from raytracer.twofold import select
 
 
-def _build(paint_tile, fill_tile):
+def _build(paint_tile, fill_tile, see=see_tile):
     """The loop over tiles for a painter, and for one of tiles that hit nothing."""
 
     @borrowing
     def paint(view, slow, bins, first, last, scratch, doubts, paints, out):
-        """Paint tiles from first on, before last; returns the first that was not painted for want of room for doubts."""
+        """Paint tiles from first on, before last; returns the first that was not, for want of room for doubts."""
         for number in range(first, last):
             if len(doubts) - doubts[0] <= TILE_WIDTH * TILE_HEIGHT:
                 return number
@@ -44,7 +44,7 @@ def _build(paint_tile, fill_tile):
             if len(slow.ids) == 0 and bins.starts[number] == bins.starts[number + 1]:
                 fill_tile(scratch, tile, paints, out)
                 continue
-            if see_tile(view, slow, bins, tile, scratch):
+            if see(view, slow, bins, tile, scratch):
                 list_doubts(view, tile, scratch, doubts)
             paint_tile(view, scratch, tile, paints, out)
         return last
@@ -60,7 +60,7 @@ def _tile(view, bins, number):
 
 
 @inlined
-def _put(out, row, x, right, red, green, blue, scratch):
+def put_lanes(out, row, x, right, red, green, blue, scratch):
     """Eight pixels from x on, or as many as there are before `right`."""
     start = np.uint64(row * out.row_bytes + x * out.pixel_bytes)
     if x + WIDTH <= right and x + WIDTH <= out.columns:
@@ -75,7 +75,7 @@ def _put(out, row, x, right, red, green, blue, scratch):
 @inlined
 def _put_background(out, row, x, right, paints, scratch):
     red, green, blue = paints.background[0], paints.background[1], paints.background[2]
-    _put(out, row, x, right, spread(red), spread(green), spread(blue), scratch)
+    put_lanes(out, row, x, right, spread(red), spread(green), spread(blue), scratch)
 
 
 @borrowing
@@ -93,7 +93,7 @@ def _flat_tile(view, scratch, tile, paints, out):
         for x in range(tile.left, tile.right, WIDTH):
             hit = is_hit(load(scratch.index, _place(tile, row, x)))
             red, green, blue = _over(paints, hit, paints.flat[0], paints.flat[1], paints.flat[2])
-            _put(out, row, x, tile.right, red, green, blue, scratch)
+            put_lanes(out, row, x, tile.right, red, green, blue, scratch)
 
 
 @borrowing
@@ -117,7 +117,7 @@ def _diffuse_tile(view, scratch, tile, paints, out):
                 red, green, blue = red + light[i, 3] * shine, green + light[i, 4] * shine, blue + light[i, 5] * shine
             r, g, b, _ = _colours(paints, where)
             red, green, blue = _over(paints, hit, to_byte(red * r), to_byte(green * g), to_byte(blue * b))
-            _put(out, row, x, tile.right, red, green, blue, scratch)
+            put_lanes(out, row, x, tile.right, red, green, blue, scratch)
 
 
 @borrowing
@@ -136,7 +136,7 @@ def _normal_tile(view, scratch, tile, paints, out):
             _, n, radius = _surface(view, line, load(scratch.k, place), x, where)
             red, green, blue = (n[0] / radius + 1.0) / 2.0, (n[1] / radius + 1.0) / 2.0, (n[2] / radius + 1.0) / 2.0
             red, green, blue = _over(paints, hit, to_byte(red), to_byte(green), to_byte(blue))
-            _put(out, row, x, tile.right, red, green, blue, scratch)
+            put_lanes(out, row, x, tile.right, red, green, blue, scratch)
 
 
 @inlined
@@ -253,6 +253,7 @@ def _no_hits_tile(scratch, tile, paints, out):
 
 paint_flat = _build(_flat_tile, _fill_tile)
 paint_diffuse = _build(_diffuse_tile, _fill_tile)
+paint_diffuse_unchecked = _build(_diffuse_tile, _fill_tile, see_tile_unchecked)
 paint_normal = _build(_normal_tile, _fill_tile)
 find_hits = _build(_hits_tile, _no_hits_tile)
 find_fine_hits = _build(_fine_hits_tile, _no_hits_tile)

@@ -2,7 +2,18 @@
 
 import numpy as np
 
-from raytracer.certified import T_TOLERANCE, contends, inner, look, look_twofold, meet, meet_twofold, nearer, passes, refine
+from raytracer.certified import (
+    T_TOLERANCE,
+    contends,
+    inner,
+    look,
+    look_twofold,
+    meet,
+    meet_twofold,
+    nearer,
+    passes,
+    refine,
+)
 from raytracer.kernels.compiler import compiled
 
 

@@ -21,24 +21,31 @@ STRIDE = TILE_WIDTH + WIDTH
 _AHEAD = 24  # list entries: how long before it is wanted a sphere is fetched
 
 
-@borrowing
-def see_tile(view, slow, bins, tile, scratch):
-    """Fill the depth buffer of a tile; returns whether there are doubts."""
-    first_row, end_row = tile.top, tile.bottom
-    for p in range(np.uint64(0), np.uint64(TILE_HEIGHT * STRIDE), np.uint64(WIDTH)):
-        store(scratch.k, p, spread(np.inf))
-        store(scratch.index, p, spread(np.int32(-1)))
-    doubts = False
-    for i in range(len(slow.ids)):
-        doubts |= _draw_slow(view, slow, i, tile.left, first_row, end_row, scratch)
-    for i in range(bins.starts[tile.number], bins.starts[tile.number + 1], WIDTH):
-        doubts |= _draw_eight(view, bins, i, bins.starts[tile.number + 1], tile.left, first_row, scratch)
-    return doubts
+def _build(draw_row):
+    """What fills the depth buffer of a tile, by a function that draws one sphere in one row."""
+
+    @borrowing
+    def see(view, slow, bins, tile, scratch):
+        """Fill the depth buffer of a tile; returns whether there are doubts."""
+        for p in range(np.uint64(0), np.uint64(TILE_HEIGHT * STRIDE), np.uint64(WIDTH)):
+            store(scratch.k, p, spread(np.inf))
+            store(scratch.index, p, spread(np.int32(-1)))
+        doubts = False
+        for i in range(len(slow.ids)):
+            doubts |= _draw_slow(view, slow, i, tile, scratch)
+        end = bins.starts[tile.number + 1]
+        for first in range(bins.starts[tile.number], end, WIDTH):
+            _look_at_eight(view, bins, first, scratch)
+            for j in range(np.uint64(0), np.uint64(min(WIDTH, end - first))):
+                doubts |= _draw(draw_row, view, bins, np.uint64(first) + j, j, tile, scratch)
+        return doubts
+
+    return see
 
 
 @inlined
-def _draw_eight(view, bins, first, end, left, top, scratch):
-    """Draw up to eight spheres of the tile's list."""
+def _look_at_eight(view, bins, first, scratch):
+    """What the next eight spheres of a list have in common with all rows: h is across·hu + up·hv + hw; c and edge."""
     u, v, back, batch = view.u, view.v, view.back, scratch.batch
     x, y, z, radius = gather_rows(view.balls, load(bins.ids, first))
     lx, ly, lz = view.eye[0] - x, view.eye[1] - y, view.eye[2] - z
@@ -48,34 +55,34 @@ def _draw_eight(view, bins, first, end, left, top, scratch):
     store(batch, 16, -inner(back[0], back[1], back[2], lx, ly, lz))
     store(batch, 24, c)
     store(batch, 32, edge_of(c, square, view.reach, view.kappa))
+
+
+@inlined
+def _draw(draw_row, view, bins, place, j, tile, scratch):
+    """Draw the sphere at a place of the list, number j of the eight that were looked at."""
+    fetch_ahead(view.balls, np.uint64(4) * np.uint64(bins.ids[place + np.uint64(_AHEAD)]))
+    i, corners, batch = bins.ids[place], bins.corners[place], scratch.batch
+    start, stop, high, low = corners & 255, corners >> 8 & 255, corners >> 16 & 255, corners >> 24
+    hu, hv, hw = batch[j], batch[j + np.uint64(8)], batch[j + np.uint64(16)]
+    c, edge = batch[j + np.uint64(24)], batch[j + np.uint64(32)]
     doubts = False
-    for j in range(np.uint64(0), np.uint64(min(WIDTH, end - first))):
-        i = bins.ids[np.uint64(first) + j]
-        fetch_ahead(view.balls, np.uint64(4) * np.uint64(bins.ids[np.uint64(first + _AHEAD) + j]))
-        corners = bins.corners[np.uint64(first) + j]
-        start, stop, high, low = corners & 255, corners >> 8 & 255, corners >> 16 & 255, corners >> 24
-        hu, hv, hw = batch[j], batch[j + np.uint64(8)], batch[j + np.uint64(16)]
-        c, edge = batch[j + np.uint64(24)], batch[j + np.uint64(32)]
-        for line in range(high, low):
-            row = np.uint64(top + line)
-            hr = view.up[row] * hv + hw
-            doubts |= _draw_row(view, i, row, line, left, start, stop, hu, hr, c, edge, scratch)
+    for line in range(high, low):
+        hr = view.up[np.uint64(tile.top + line)] * hv + hw
+        doubts |= draw_row(view, i, line, tile, start, stop, hu, hr, c, edge, scratch)
     return doubts
 
 
 @inlined
-def _draw_row(view, i, row, line, left, start, stop, hu, hr, c, edge, scratch):
-    """One quick sphere in one row of its box."""
+def _draw_row(view, i, line, tile, start, stop, hu, hr, c, edge, scratch):
+    """One quick sphere in one row of its box; returns whether there are doubts."""
+    row, doubts = np.uint64(tile.top + line), False
     a2, a1, a0 = view.a2, view.a1[row], view.a0[row]
-    x, end = np.uint64(left + start), np.uint64(left + stop)
-    p = np.uint64(line * STRIDE + start)
-    doubts = False
+    x, end, p = np.uint64(tile.left + start), np.uint64(tile.left + stop), np.uint64(line * STRIDE + start)
     while x < end:
         across, best = load(view.across, x), load(scratch.k, p)
         a = (across * a2 + a1) * across + a0
         k, wins, doubt = approach(across * hu + hr, a, c, edge, best)
-        store(scratch.k, p, blend(wins, k, best))
-        store(scratch.index, p, blend(wins, spread(i), load(scratch.index, p)))
+        _keep(scratch, p, wins, k, best, i)
         if any_of(doubt):
             _note(scratch.doubt, p, bits_of(doubt))
             doubts = True
@@ -84,23 +91,45 @@ def _draw_row(view, i, row, line, left, start, stop, hu, hr, c, edge, scratch):
     return doubts
 
 
+@inlined
+def _draw_row_unchecked(view, i, line, tile, start, stop, hu, hr, c, edge, scratch):
+    """The same with no doubts: to measure what certainty costs."""
+    row = np.uint64(tile.top + line)
+    a2, a1, a0 = view.a2, view.a1[row], view.a0[row]
+    x, end, p = np.uint64(tile.left + start), np.uint64(tile.left + stop), np.uint64(line * STRIDE + start)
+    while x < end:
+        across, best = load(view.across, x), load(scratch.k, p)
+        a = (across * a2 + a1) * across + a0
+        k, wins, _ = approach(across * hu + hr, a, c, edge, best)
+        _keep(scratch, p, wins, k, best, i)
+        x += np.uint64(WIDTH)
+        p += np.uint64(WIDTH)
+    return False
+
+
+@inlined
+def _keep(scratch, p, wins, k, best, i):
+    """Put what wins into the depth buffer."""
+    store(scratch.k, p, blend(wins, k, best))
+    store(scratch.index, p, blend(wins, spread(i), load(scratch.index, p)))
+
+
 @borrowing
-def _draw_slow(view, slow, i, left, top, bottom, scratch):
+def _draw_slow(view, slow, i, tile, scratch):
     """Any sphere in its box."""
-    start, stop = max(slow.boxes[i, 0] - left, 0), min(slow.boxes[i, 1] - left, TILE_WIDTH)
+    start, stop = max(slow.boxes[i, 0] - tile.left, 0), min(slow.boxes[i, 1] - tile.left, TILE_WIDTH)
     c, c_error, size, radius = slow.seen.c[i], slow.seen.c_error[i], slow.seen.size[i], slow.seen.radius[i]
     doubts = False
-    for row in range(max(slow.boxes[i, 2], top), min(slow.boxes[i, 3], bottom)):
+    for row in range(max(slow.boxes[i, 2], tile.top), min(slow.boxes[i, 3], tile.bottom)):
         hu, hr = slow.seen.hu[i], view.up[row] * slow.seen.hv[i] + slow.seen.hw[i]
-        x, end = np.uint64(left + start), np.uint64(left + stop)
-        p = np.uint64((row - top) * STRIDE + start)
+        x, end = np.uint64(tile.left + start), np.uint64(tile.left + stop)
+        p = np.uint64((row - tile.top) * STRIDE + start)
         while x < end:
             across, best = load(view.across, x), load(scratch.k, p)
             a = (across * view.a2 + view.a1[row]) * across + view.a0[row]
             t, _, low = meet(across * hu + hr, a, c, c_error, size, radius, view.reach, K_ERROR / 2)
             k, wins, doubt = arrive(t, low, a, best)
-            store(scratch.k, p, blend(wins, k, best))
-            store(scratch.index, p, blend(wins, spread(slow.ids[i]), load(scratch.index, p)))
+            _keep(scratch, p, wins, k, best, slow.ids[i])
             if any_of(doubt):
                 _note(scratch.doubt, p, bits_of(doubt))
                 doubts = True
@@ -127,6 +156,9 @@ def list_doubts(view, tile, scratch, doubts):
                 doubts[0] += 1
                 doubts[doubts[0]] = (tile.top + line) * width + tile.left + x
     scratch.doubt[:] = False
+
+
+see_tile, see_tile_unchecked = _build(_draw_row), _build(_draw_row_unchecked)
 
 
 @compiled

@@ -1,0 +1,45 @@
+"""Stages that look at the hits of the whole picture: from t and index to bytes, rows at a time."""
+
+import numpy as np
+
+from raytracer.kernels.compiler import borrowing
+from raytracer.kernels.lanes import WIDTH, is_hit, load, spread
+from raytracer.kernels.tiles import put_lanes
+from raytracer.shading import grey_of, to_byte
+from raytracer.twofold import select
+
+
+@borrowing
+def range_of(t, index):
+    """The smallest and the largest t of all hits, or +inf and 0."""
+    near, far = np.inf, 0.0
+    for p in range(len(t)):
+        if index[p] >= 0:
+            near, far = min(near, t[p]), max(far, t[p])
+    return near, far
+
+
+@borrowing
+def paint_depth(t, index, near, far, first, last, width, scratch, paints, out):
+    """`stages.depth` of rows first to last − 1. The arrays have eight elements to spare."""
+    for row in range(first, last):
+        for x in range(0, width, WIDTH):
+            p = np.uint64(row * width + x)
+            grey = to_byte(grey_of(load(t, p), near, far))
+            grey = select(is_hit(load(index, p)), grey, spread(paints.background[0]))
+            put_lanes(out, row, x, width, grey, grey, grey, scratch)
+
+
+@borrowing
+def paint_edges(t, index, near, far, first, last, width, scratch, paints, out):
+    """`stages.edges` of rows first to last − 1."""
+    height, step = len(index) // width, np.uint64(width)
+    for row in range(first, last):
+        below = step if row + 1 < height else np.uint64(0)
+        for x in range(width):
+            p = np.uint64(row * width + x)
+            right = np.uint64(1) if x + 1 < width else np.uint64(0)
+            edge = (index[p] != index[p + right]) | (index[p] != index[p + below])
+            start = np.uint64(row * out.row_bytes + x * out.pixel_bytes)
+            byte = np.uint8(0) if edge else np.uint8(255)
+            out.bytes[start], out.bytes[start + np.uint64(1)], out.bytes[start + np.uint64(2)] = byte, byte, byte
