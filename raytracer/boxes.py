@@ -16,12 +16,12 @@ is added for them, for frames that magnify errors by no more than `camera.invers
 
 from __future__ import annotations
 
-from math import frexp, inf, ldexp
+from math import frexp, hypot, inf, ldexp, nan, sqrt
 from typing import NamedTuple
 
 import numpy as np
 
-from raytracer.camera import SAMPLINGS, Raster, inverse_frame
+from raytracer.camera import SAMPLINGS, Raster, directions_of, eye_grid, inverse_frame
 from raytracer.certified import inner
 from raytracer.twofold import Number, select
 
@@ -49,6 +49,27 @@ class Lens(NamedTuple):
     width: float  # in pixels
     height: float
     shift: float  # of the ray in its pixel, in half pixels
+    axis: Row  # the direction of the picture's middle, of length 1
+    cos: float  # of the widest angle between it and a ray of the picture
+    sin: float
+
+
+def _cone(raster: Raster) -> tuple[Row, float, float]:
+    """The axis of a cone that holds all rays of a picture, and cos and sin of its angle, whose widest are corners."""
+    grid = eye_grid(raster)
+    corners = directions_of(grid, grid.across[[0, 0, -1, -1]], grid.up[[0, -1, 0, -1]])
+    rays = [_unit(row) for row in np.array(corners).T.tolist()]
+    axis = _unit([sum(column) for column in zip(*rays, strict=True)])
+    cos = min(inner(*axis, *ray) for ray in rays)
+    if not cos > 0.0:  # wider than half of all directions: the sum of both angles may be more than half a turn
+        return axis, nan, nan
+    return axis, cos, sqrt(max(0.0, 1.0 - cos * cos))
+
+
+def _unit(vector: list[float]) -> Row:
+    x, y, z = vector
+    length = hypot(x, y, z)
+    return (x / length, y / length, z / length) if 0.0 < length < inf else (nan, nan, nan)
 
 
 class Box(NamedTuple):
@@ -79,7 +100,18 @@ def make_lens(raster: Raster) -> Lens:
     return Lens(
         nx, ny, nz, inner(*nz, *nz), inner(*nx, *nz), inner(*ny, *nz), inner(*cross_x, *cross_x),
         inner(*cross_y, *cross_y), ldexp(1.0, up_x), ldexp(1.0, up_y), _CROSSES * magnification, width, height, shift,
+        *_cone(raster),
     )  # fmt: skip
+
+
+def beside(lens: Lens, qx: Number, qy: Number, qz: Number, c: Number, square: Number, radius: Number) -> Number:
+    """Whether a sphere is certainly beside all rays of the picture, or behind the eye: c and l² as in `certified`.
+
+    The rays that meet it make an angle of at most asin(r/l) with Q, those of the picture one of θ with the axis; so it
+    is beside them if the angle between Q and the axis is above the sum of both: axis·Q < l·cos(θ + asin(r/l)).
+    """
+    along = inner(lens.axis[0], lens.axis[1], lens.axis[2], qx, qy, qz)
+    return (c > 0.0) & (along < lens.cos * np.sqrt(c) - lens.sin * radius - _PAD * np.sqrt(square))
 
 
 def box_of(lens: Lens, qx: Number, qy: Number, qz: Number, radius: Number) -> Box:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from raytracer.arrays import Balls, Candidates, First, Grid, Nearest, Rays, Seen, Sides, TwofoldRays, UsualRays, View
-from raytracer.boxes import Lens, box_of
+from raytracer.boxes import Lens, beside, box_of
 from raytracer.camera import squares
 from raytracer.certified import (
     K_ERROR,
@@ -27,6 +27,7 @@ from raytracer.certified import (
     meet_twofold,
     nearer,
     refine,
+    side_of,
 )
 from raytracer.methods import METHODS, Vector
 from raytracer.twofold import select
@@ -38,11 +39,13 @@ def bound(lens: Lens, origin: np.ndarray, balls: np.ndarray) -> tuple[np.ndarray
     And whether the sphere is known to be in front of the eye as a whole: bool (s,). The box of one behind the eye is
     empty, that of one around the eye or beside it is the whole picture.
     """
-    box = box_of(lens, *xyz(balls[:, :3] - origin), balls[:, 3])
+    x, y, z = xyz(balls[:, :3] - origin)
+    box, (c, square) = box_of(lens, x, y, z, balls[:, 3]), side_of(x, y, z, balls[:, 3])
+    hidden = (box.known & (box.ahead <= 0.0)) | (~box.known & beside(lens, x, y, z, c, square, balls[:, 3]))
     whole = np.array([0, lens.width, 0, lens.height])
     sides = np.stack(box[:4], axis=-1)
     front = box.known & (box.ahead > 0.0)
-    sides = np.where(front[:, None], sides, np.where(box.known[:, None], 0.0, whole))
+    sides = np.where(front[:, None], sides, np.where(hidden[:, None], 0.0, whole))
     return sides.astype(np.int32), front
 
 

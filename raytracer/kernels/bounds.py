@@ -12,10 +12,10 @@ A slow sphere is one that `certified.approach` is not for: around the eye or clo
 
 import numpy as np
 
-from raytracer.boxes import box_of
+from raytracer.boxes import beside, box_of
 from raytracer.certified import edge_of, side_of
 from raytracer.kernels.compiler import borrowing, inlined
-from raytracer.kernels.lanes import WIDTH, load_rows, store_boxes
+from raytracer.kernels.lanes import WIDTH, all_of, load_rows, store_boxes
 from raytracer.twofold import select
 
 _WIDE, _HIGH = 6, 6
@@ -37,6 +37,8 @@ def bound(lens, eye, reach, kappa, balls, first, last, boxes, counts, columns):
         c, square = side_of(qx, qy, qz, radius)
         quick = box.known & (box.ahead > 0.0) & (edge_of(c, square, reach, kappa) > 0.0)
         hidden = box.known & (box.ahead <= 0.0)
+        if not all_of(box.known):
+            hidden = hidden | beside(lens, qx, qy, qz, c, square, radius)
         left = select(quick, box.left, select(hidden, 0.0, _SLOW))
         store_boxes(boxes, i, left, select(quick, box.right, 0.0), box.top, box.bottom)
         slow += _count(boxes, i, min(i + np.uint64(WIDTH), np.uint64(last)), counts, columns)

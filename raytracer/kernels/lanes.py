@@ -5,7 +5,7 @@ vectors the processor has. The compiler vectorises plain loops too, but not thos
 and it does not say when it gives up. The formulas of `certified`, plain arithmetic, take lanes as they take numbers.
 
     Lanes    <8 x double>   + − × ÷, −x, abs, sqrt, floor, ceil, comparisons; a number beside lanes counts eight times
-    Mask     <8 x i1>       & | ~; any_of, bits_of; `select(mask, lanes, lanes)`
+    Mask     <8 x i1>       & | ~; any_of, all_of, bits_of; `select(mask, lanes, lanes)`
     Places   <8 x i32>      eight int32
 
 Arrays are one-dimensional and contiguous; nothing checks their ends.
@@ -153,6 +153,16 @@ def any_of(typing, mask):
 
     def lower(context, builder, sig, args):
         return builder.icmp_unsigned("!=", builder.bitcast(args[0], _BYTE), ir.Constant(_BYTE, 0))
+
+    return types.boolean(mask), lower
+
+
+@intrinsic
+def all_of(typing, mask):
+    """Whether all lanes are true."""
+
+    def lower(context, builder, sig, args):
+        return builder.icmp_unsigned("==", builder.bitcast(args[0], _BYTE), ir.Constant(_BYTE, 255))
 
     return types.boolean(mask), lower
 
