@@ -33,7 +33,7 @@ def paint_depth(t, index, near, far, first, last, width, scratch, paints, out):
 @borrowing
 def paint_edges(t, index, near, far, first, last, width, scratch, paints, out):
     """`stages.edges` of rows first to last − 1."""
-    height, step = len(index) // width, np.uint64(width)
+    height, step = (len(index) - WIDTH) // width, np.uint64(width)
     for row in range(first, last):
         below = step if row + 1 < height else np.uint64(0)
         for x in range(width):

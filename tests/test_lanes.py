@@ -1,0 +1,103 @@
+"""Eight numbers as one: each operation is the one on single numbers, eight times."""
+
+import operator
+
+import numpy as np
+import pytest
+
+from raytracer import backend
+
+pytestmark = pytest.mark.skipif(backend.why_no_compiler() != "", reason="numba is not installed")
+if not backend.why_no_compiler():
+    import raytracer.kernels  # noqa: F401 (brings select for lanes)
+    from raytracer import twofold
+    from raytracer.kernels import lanes as k
+    from raytracer.kernels.compiler import borrowing
+
+    EIGHT = np.uint64(8)
+A = np.array([1.5, -2.0, 0.0, -0.0, np.inf, np.nan, 1e300, -7.25])
+B = np.array([0.5, -2.0, 3.0, 1.0, -np.inf, 1.0, 1e300, 2.0])
+
+
+@pytest.mark.parametrize("symbol", [operator.add, operator.sub, operator.mul, operator.truediv])
+def test_arithmetic(symbol):
+    @borrowing
+    def run(a, b, out):
+        k.store(out, 0, symbol(k.load(a, 0), k.load(b, 0)))
+        k.store(out, EIGHT, symbol(k.load(a, 0), 3.0))
+
+    out = np.empty(16)
+    run(A, B, out)
+    with np.errstate(all="ignore"):
+        np.testing.assert_array_equal(out, np.concatenate([symbol(A, B), symbol(A, 3.0)]))
+
+
+@pytest.mark.parametrize("symbol", [operator.neg, abs, np.sqrt, np.floor, np.ceil])
+def test_functions(symbol):
+    @borrowing
+    def run(a, out):
+        k.store(out, 0, symbol(k.load(a, 0)))
+
+    out = np.empty(8)
+    run(A, out)
+    with np.errstate(all="ignore"):
+        np.testing.assert_array_equal(out, symbol(A))
+
+
+@pytest.mark.parametrize("symbol", [operator.lt, operator.le, operator.gt, operator.ge, operator.eq])
+def test_comparisons_and_masks(symbol):
+    @borrowing
+    def run(a, b, out):
+        mask, positive = symbol(k.load(a, 0), k.load(b, 0)), k.load(a, 0) > 0.0
+        k.store(out, 0, twofold.select(mask & positive, k.load(a, 0), -1.0))
+        return k.bits_of(mask | positive), k.bits_of(~mask), k.any_of(mask), k.all_of(mask)
+
+    out = np.empty(8)
+    bits, others, some, every = run(A, B, out)
+    with np.errstate(all="ignore"):
+        mask, positive = symbol(A, B), A > 0
+    np.testing.assert_array_equal(out, np.where(mask & positive, A, -1.0))
+    assert bits == sum(1 << i for i in range(8) if (mask | positive)[i])
+    assert others == sum(1 << i for i in range(8) if not mask[i])
+    assert (some, every) == (mask.any(), mask.all())
+
+
+def test_rows_are_turned_into_columns():
+    table = np.arange(80.0)
+    places = np.array([3, 0, 19, 7, 7, 1, 12, 5], np.int32)
+
+    @borrowing
+    def run(table, places, out):
+        columns, gathered = k.load_rows(table, 2), k.gather_rows(table, k.load(places, 0))
+        for i in range(4):
+            k.store(out, np.uint64(8 * i), columns[i])
+            k.store(out, np.uint64(32 + 8 * i), gathered[i])
+        k.store(out, np.uint64(64), k.gather(table, k.load(places, 0)))
+        return k.first_of(k.load(places, 0)), k.largest_of(k.load(places, 0)), k.same(k.load(places, 0))
+
+    out = np.empty(72)
+    assert run(table, places, out) == (3, 19, False)
+    rows = table.reshape(-1, 4)
+    np.testing.assert_array_equal(out[:32].reshape(4, 8), rows[2:10].T)
+    np.testing.assert_array_equal(out[32:64].reshape(4, 8), rows[places].T)
+    np.testing.assert_array_equal(out[64:], table[places])
+
+
+def test_boxes_and_pixels_are_written_in_rows():
+    @borrowing
+    def run(numbers, boxes, three, four):
+        a, b, c, d = k.load(numbers, 0), k.load(numbers, 8), k.load(numbers, 16), k.load(numbers, 24)
+        k.store_boxes(boxes, 1, a, b, c, d)
+        k.put_pixels(three, 2, 3, a, b, c)
+        k.put_pixels(four, 4, 4, a, b, c)
+
+    numbers = np.arange(32.0) * 7 + 0.5
+    boxes, three, four = np.full(40, -5, np.int32), np.full(28, 1, np.uint8), np.full(40, 2, np.uint8)
+    run(numbers, boxes, three, four)
+    columns = np.floor(numbers).astype(int).reshape(4, 8)
+    assert boxes.tolist() == [-5] * 4 + columns.T.ravel().tolist() + [-5] * 4
+    assert three.tolist() == [1, 1, *columns[:3].T.ravel().tolist(), 1, 1]
+    assert four[4:36].reshape(8, 4)[:, :3].tolist() == columns[:3].T.tolist()
+    assert (four[4:36].reshape(8, 4)[:, 3] == 2).all()
+    assert (four[:4] == 2).all()
+    assert (four[36:] == 2).all()

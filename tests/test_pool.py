@@ -1,0 +1,71 @@
+"""Work that is shared among threads."""
+
+import threading
+
+import pytest
+
+from raytracer.pool import share
+
+
+@pytest.mark.parametrize("threads", [1, 2, 5, None])
+def test_every_job_is_done_once_and_told_of_by_the_caller(threads):
+    done, told = [], []
+
+    def work(job, worker):
+        done.append((job, worker, threading.get_ident()))
+        return -job
+
+    share(list(range(50)), work, threads, lambda result: told.append((result, threading.get_ident())))
+    assert sorted(job for job, _, _ in done) == list(range(50))
+    assert sorted(-result for result, _ in told) == list(range(50))
+    assert {thread for _, thread in told} == {threading.get_ident()}
+    assert all((worker == 0) == (thread == threading.get_ident()) for _, worker, thread in done)
+    assert max(worker for _, worker, _ in done) < (threads or 100)
+
+
+def test_no_jobs_are_no_trouble():
+    share([], lambda job, worker: job)
+
+
+@pytest.mark.parametrize("bad", [0, 7, 49])
+def test_the_first_exception_ends_it_and_is_raised(bad):
+    done = []
+
+    def work(job, worker):
+        if job == bad:
+            raise ZeroDivisionError(str(bad))
+        done.append(job)
+
+    with pytest.raises(ZeroDivisionError, match=str(bad)):
+        share(list(range(50)), work, 2)
+    assert len(done) < 50
+
+
+def test_an_exception_of_another_thread_is_raised_here():
+    started = threading.Event()
+
+    def work(job, worker):
+        if worker == 0:
+            started.wait(5)
+        else:
+            started.set()
+            raise KeyError("elsewhere")
+
+    with pytest.raises(KeyError, match="elsewhere"):
+        share([0, 1], work, 2)
+
+
+def test_many_callers_at_a_time():
+    sums = []
+
+    def call():
+        results = []
+        share(list(range(20)), lambda job, worker: job, 2, results.append)
+        sums.append(sum(results))
+
+    callers = [threading.Thread(target=call) for _ in range(8)]
+    for caller in callers:
+        caller.start()
+    for caller in callers:
+        caller.join(20)
+    assert sums == [190] * 8

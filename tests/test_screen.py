@@ -1,0 +1,151 @@
+"""Eye rays in tiles: the same hits and the same bytes as the numpy path, whatever the size, the threads, the memory."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from raytracer import STAGES, backend, eye_hits, interpreter, make_plan, plain, render_scene, screen
+from raytracer.bench import spread
+from raytracer.camera import make_raster
+from raytracer.eye import count_tests
+from raytracer.interpreter import interpret
+from raytracer.render import draw, hits_of, open_tracer
+from raytracer.scene import Camera, Scene, Spheres
+from raytracer.screen import open_screen
+
+pytestmark = pytest.mark.skipif(backend.why_no_compiler() != "", reason="numba is not installed")
+KERNELS = backend.load()
+PAINTED = [name for name, stage in STAGES.items() if stage.painter]
+
+
+def drawn(scene, stage, width, height, path, **options):
+    return draw(make_plan(scene, stage, width, height, path=path), **options)
+
+
+@pytest.mark.parametrize("stage", PAINTED)
+@pytest.mark.parametrize("size", [(1, 1), (67, 65), (130, 3)], ids=str)
+def test_kernels_paint_the_bytes_that_numpy_draws(scene_path, stage, size):
+    scene = interpreter(scene_path)
+    if len(scene.spheres) > 1000 and size != (67, 65):
+        pytest.skip("one size of the large scene is enough")
+    found, expected = (drawn(scene, stage, *size, path) for path in (KERNELS, plain))
+    np.testing.assert_array_equal(found, expected)
+
+
+def around_the_eye(count: int, seed: int) -> Scene:
+    """Spheres everywhere: before, beside, behind and about the eye, some of them large, and a skewed camera."""
+    rng = np.random.default_rng(seed)
+    centres, radii = rng.normal(size=(count, 3)) * 3, 10.0 ** rng.uniform(-3, 0.3, count)
+    order = np.arange(count, dtype=np.int32)
+    spheres = Spheres(radii, centres, np.zeros(count, np.int32), order, interpret(SURFACE).materials)
+    u, v, w = (tuple(row) for row in (np.eye(3) + rng.normal(size=(3, 3)) / 5).tolist())
+    return replace(interpret(SURFACE), camera=Camera((0.0, 0.1, 0.2), u, v, w, 70.0), spheres=spheres)
+
+
+SURFACE = "light 3 4 5 1 1 1\nlight -3 0 1 .5 .5 .2\nsurface .9 .7 .5 0 0 0 0 0 0 1 0\nrender"
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_both_paths_find_the_same_hits_among_spheres_all_around(seed):
+    scene = around_the_eye(300, seed)
+    found = []
+    for path in (KERNELS, plain):
+        plan = make_plan(scene, "hit", 90, 70, "centre", path=path)
+        with open_tracer(plan) as tracer:
+            found.append(hits_of(plan, tracer, polished=True))
+    np.testing.assert_array_equal(found[0].index, found[1].index)
+    np.testing.assert_array_equal(found[0].t, found[1].t)
+    np.testing.assert_array_equal(drawn(scene, "diffuse", 90, 70, KERNELS), drawn(scene, "diffuse", 90, 70, plain))
+
+
+def test_the_picture_does_not_depend_on_threads():
+    scene = spread(20_000, seed=2)
+    one = render_scene(scene, "diffuse", 300, 200, threads=1)
+    for threads in (2, 3, 16):
+        np.testing.assert_array_equal(render_scene(scene, "diffuse", 300, 200, threads=threads), one)
+
+
+def test_doubts_that_do_not_fit_their_list_are_decided_on_the_way(monkeypatch):
+    scene = interpreter("scenes/hard/08_tied_spheres.cli")
+    expected = eye_hits(scene, 200, 200)
+    monkeypatch.setattr(screen, "_DOUBTS", KERNELS.TILE_WIDTH * KERNELS.TILE_HEIGHT + 2)
+    monkeypatch.setattr(screen, "_idle", screen.LifoQueue(2))
+    found = eye_hits(scene, 200, 200)
+    np.testing.assert_array_equal(found.index, expected.index)
+    np.testing.assert_array_equal(found.t, expected.t)
+
+
+@pytest.mark.parametrize("width", [64, 75, 203])
+@pytest.mark.parametrize("stage", PAINTED)
+def test_out_may_be_the_first_three_bands_of_four(width, stage):
+    scene = spread(500, seed=3)
+    picture = np.full((50, width, 4), 7, np.uint8)
+    assert render_scene(scene, stage, width, 50, out=picture[..., :3]).base is not None
+    np.testing.assert_array_equal(picture[..., :3], render_scene(scene, stage, width, 50))
+    assert (picture[..., 3] == 7).all()
+
+
+@pytest.mark.parametrize("view", [np.s_[::-1], np.s_[:, ::-1], np.s_[..., ::-1], np.s_[:, :, 0:6:2]])
+def test_out_may_be_any_other_view(view):
+    scene = spread(500, seed=3)
+    room = np.zeros((40, 30, 6 if view == np.s_[:, :, 0:6:2] else 3), np.uint8)
+    render_scene(scene, "diffuse", 30, 40, out=room[view])
+    np.testing.assert_array_equal(room[view], render_scene(scene, "diffuse", 30, 40))
+
+
+def test_rows_of_out_may_lie_apart():
+    scene, room = spread(500, seed=3), np.full((40, 50, 3), 9, np.uint8)
+    render_scene(scene, "normal", 31, 40, out=room[:, 5:36])
+    np.testing.assert_array_equal(room[:, 5:36], render_scene(scene, "normal", 31, 40))
+    assert (room[:, :5] == 9).all()
+    assert (room[:, 36:] == 9).all()
+
+
+def test_memory_is_forty_bytes_a_sphere_at_most():
+    scene, few = spread(400_000, seed=1), spread(10, seed=1)
+    sizes = []
+    for each in (few, scene):
+        with open_screen(each, make_raster(each.camera, 64, 64), KERNELS) as opened:
+            arrays = [opened.bins.boxes, opened.bins.ids, opened.bins.corners, opened.slow.boxes]
+            sizes.append(sum(array.nbytes for array in arrays))
+    assert (sizes[1] - sizes[0]) / (len(scene.spheres) - len(few.spheres)) <= 40
+
+
+def test_without_certainty_ordinary_pictures_are_the_same():
+    scene = spread(1000, seed=4)
+    plan = make_plan(scene, "diffuse", 320, 180)
+    unchecked = draw(replace(plan, unchecked=True))
+    assert (unchecked != draw(plan)).any(axis=2).mean() < 1e-4
+
+
+def test_a_light_farther_than_squares_reach_still_shines():
+    scene = interpret("light 0 0 1e200 1 1 1\nsurface 1 1 1 0 0 0 0 0 0 1 0\nsphere 1 0 0 -4")
+    assert make_plan(scene, path=KERNELS).painter == ""
+    found = render_scene(scene, "diffuse", 64, 64)
+    near = interpret("light 0 0 1e9 1 1 1\nsurface 1 1 1 0 0 0 0 0 0 1 0\nsphere 1 0 0 -4")
+    assert np.abs(found.astype(int) - render_scene(near, "diffuse", 64, 64)).max() <= 1
+    assert found.max() == 255
+
+
+BOX = st.tuples(st.integers(0, 9), st.integers(0, 9), st.integers(0, 7), st.integers(0, 7))
+
+
+@settings(max_examples=50)
+@given(st.lists(BOX, max_size=6))
+def test_tests_are_counted_box_by_box(boxes):
+    raster = make_raster(Camera(), 9, 7)
+    expected = np.zeros((7, 9), int)
+    for left, right, top, bottom in boxes:
+        if left < right and top < bottom:
+            expected[top:bottom, left:right] += 1
+    np.testing.assert_array_equal(count_tests(np.array(boxes, np.int32).reshape(-1, 4), raster), expected)
+
+
+def test_stage_cost_shows_the_tests_of_the_tracer():
+    scene = spread(3000, seed=6)
+    pictures = [drawn(scene, "cost", 60, 60, path) for path in (KERNELS, plain)]
+    np.testing.assert_array_equal(*pictures)
+    assert len(np.unique(pictures[0].reshape(-1, 3), axis=0)) >= 3
