@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from threading import Event
+from types import FrameType
 from typing import NamedTuple
 
 from tqdm import tqdm
@@ -30,7 +34,7 @@ def render(arguments: argparse.Namespace) -> int:
             bar.total = total
             bar.update(1)
 
-        picture = draw(plan, threads=arguments.threads, progress=show)
+        picture = draw(plan, threads=arguments.threads, progress=show, cancelled=_interrupted.is_set)
     save_png(arguments.output, picture)
     return 0
 
@@ -238,13 +242,35 @@ def _parser() -> argparse.ArgumentParser:
 def main(words: list[str] | None = None) -> int:
     """Run one command; the exit status is 0, 1 for bad input, 2 for wrong arguments, 130 when interrupted."""
     arguments = _parser().parse_args(words)
+    with _noting_interrupts():
+        try:
+            status = int(arguments.function(arguments))
+        except (ValueError, OSError, MemoryError) as error:
+            print(_one_line(error), file=sys.stderr)
+            return 1
+        except BaseException:
+            if not _interrupted.is_set():
+                raise
+    return 130 if _interrupted.is_set() else status
+
+
+_interrupted = Event()
+
+
+@contextmanager
+def _noting_interrupts() -> Iterator[None]:
+    """Remember Ctrl-C: in the middle of compiling its exception may be swallowed, or become another one."""
+
+    def note(number: int, frame: FrameType | None) -> None:
+        _interrupted.set()
+        raise KeyboardInterrupt
+
+    _interrupted.clear()
+    before = signal.signal(signal.SIGINT, note)
     try:
-        return int(arguments.function(arguments))
-    except (ValueError, OSError, MemoryError) as error:
-        print(_one_line(error), file=sys.stderr)
-        return 1
-    except KeyboardInterrupt:
-        return 130
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _one_line(error: Exception) -> str:

@@ -141,6 +141,7 @@ class Pixel:
         )
 
 
+@np.errstate(all="ignore")
 def probe_pixel(
     scene: Scene,
     x: int,
