@@ -13,7 +13,7 @@ from __future__ import annotations
 from decimal import Decimal, localcontext
 from fractions import Fraction
 from functools import lru_cache
-from math import hypot, inf, isfinite, lcm
+from math import hypot, inf, isfinite
 from operator import index
 from typing import NamedTuple
 
@@ -79,8 +79,8 @@ def _check_camera(camera: Camera) -> None:
         raise ValueError(f"found fov {camera.fov}, expected an angle in degrees above 0 and below 180")
     if not np.isfinite([camera.eye, camera.u, camera.v, camera.w]).all():
         raise ValueError("found a camera with a number that is not finite")
-    u, v, w = ([Fraction(x) for x in axis] for axis in (camera.u, camera.v, camera.w))
-    if not sum(a * b for a, b in zip(u, _cross(v, w), strict=True)):
+    numbers, _ = _whole_frame(camera)
+    if not _inner(numbers[:3], _cross(numbers[3:6], numbers[6:])):
         raise ValueError("found dependent vectors u, v, w in a camera, expected three that point out of one plane")
 
 
@@ -123,11 +123,12 @@ class Raster(NamedTuple):
 
 @lru_cache(maxsize=64)
 def _whole_frame(camera: Camera) -> tuple[list[int], int]:
-    """u, v and d·w in integers, and what they are to be divided by."""
-    back = Fraction(focal_length(camera.fov))
-    numbers = [*map(Fraction, camera.u + camera.v), *(back * Fraction(w) for w in camera.w)]
-    unit = lcm(*(number.denominator for number in numbers))
-    return [int(number * unit) for number in numbers], unit
+    """u, v and d·w in integers, and what they are to be divided by, a power of two."""
+    over, under = focal_length(camera.fov).as_integer_ratio()
+    ratios = [x.as_integer_ratio() for x in camera.u + camera.v]
+    ratios += [(n * over, m * under) for n, m in (x.as_integer_ratio() for x in camera.w)]
+    unit = max(m for _, m in ratios)
+    return [n * (unit // m) for n, m in ratios], unit
 
 
 @lru_cache(maxsize=8)
@@ -218,18 +219,13 @@ def twofold_given_rays(directions: np.ndarray) -> TwofoldRays:
 @lru_cache(maxsize=64)
 def inverse_frame(camera: Camera) -> tuple[list[list[float]], float] | None:
     """The rows n₁, n₂, n₃ of (u, v, −d·w)⁻¹ and by how much it magnifies errors; None where that is too much."""
-    back = Fraction(focal_length(camera.fov))
-    columns = [
-        [Fraction(x) for x in camera.u],
-        [Fraction(x) for x in camera.v],
-        [-back * Fraction(x) for x in camera.w],
-    ]
-    u, v, w = columns
+    numbers, unit = _whole_frame(camera)
+    u, v, w = numbers[:3], numbers[3:6], [-x for x in numbers[6:]]
     crosses = [_cross(v, w), _cross(w, u), _cross(u, v)]
-    determinant = sum(a * b for a, b in zip(u, crosses[0], strict=True))
+    determinant = _inner(u, crosses[0])
     try:
-        rows = [[float(x / determinant) for x in row] for row in crosses]
-        sizes = [hypot(*map(float, column)) for column in columns]
+        rows = [[x * unit / determinant for x in row] for row in crosses]
+        sizes = [hypot(*(x / unit for x in column)) for column in (u, v, w)]
     except OverflowError:
         return None
     magnification = max(hypot(*row) * size for row, size in zip(rows, sizes, strict=True))
@@ -258,5 +254,9 @@ def _ratio(numerator: Number, denominator: float) -> Twofold:
     return quotient, ((numerator - product) - product_low) / denominator
 
 
-def _cross(a: list[Fraction], b: list[Fraction]) -> list[Fraction]:
+def _inner(a: list[int], b: list[int]) -> int:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _cross(a: list[int], b: list[int]) -> list[int]:
     return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]

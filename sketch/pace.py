@@ -11,7 +11,10 @@ import numpy as np
 COARSENESS = (1, 2, 4, 8)  # columns and rows of the window that a pixel may be drawn across
 BUDGET = 12.0  # milliseconds for drawing a frame: 60 in a second, less what it takes to show one
 _CALM = 0.8  # of the budget: a finer picture must promise to be that fast, so that noise changes nothing
-_RECENT = 5  # pictures that are remembered
+_PLENTY = 0.4  # of the budget: a size that takes less leaves time to try a finer one
+_RECENT = 5  # pictures of each size that are remembered
+_SELDOM = 200  # pictures between two trials of a size
+_STALE = 20  # pictures after which a size that was not drawn again is forgotten
 
 
 class Pace:
@@ -19,19 +22,33 @@ class Pace:
 
     def __init__(self) -> None:
         self.coarse = 1
-        self._took: deque[tuple[int, float]] = deque(maxlen=_RECENT)
+        self._path = ""
+        self._took: dict[int, deque[float]] = {}
+        self._count, self._last = 0, dict[int, int]()  # of all pictures; and when one of each size was the last
 
-    def took(self, coarse: int, milliseconds: float) -> None:
-        """A picture that coarse took so long; or longer, if it was given up by then."""
-        self._took.append((coarse, milliseconds))
+    def took(self, coarse: int, milliseconds: float, path: str = "") -> None:
+        """A picture that coarse took so long; or longer, if it was given up by then. On another path all is new."""
+        if path != self._path:
+            self._path, self._took = path, {}
+        self._count += 1
+        self._last[coarse] = self._count
+        self._took.setdefault(coarse, deque(maxlen=_RECENT)).append(milliseconds)
+        for other in [other for other in self._took if self._last[other] < self._count - _STALE]:
+            del self._took[other]
 
     def choose(self) -> int:
-        """The finest that is fast enough."""
+        """The finest that is fast enough; now and then a finer one, to see, while there is much time to spare."""
         limits = {coarse: BUDGET if coarse >= self.coarse else _CALM * BUDGET for coarse in COARSENESS}
         self.coarse = next(
             (coarse for coarse in COARSENESS if self._expected(coarse) <= limits[coarse]), COARSENESS[-1]
         )
-        return self.coarse
+        return self.coarse // 2 if self._may_try() else self.coarse
+
+    def _may_try(self) -> bool:
+        """Whether to draw one frame finer than what is known to be fast enough."""
+        finer = self.coarse // 2
+        lately = self._count - self._last.get(finer, -_SELDOM) < _SELDOM
+        return finer > 0 and not lately and self._expected(self.coarse) <= _PLENTY * BUDGET
 
     def _expected(self, coarse: int) -> float:
         """Milliseconds, on straight lines between what is known: a picture of no pixels takes none.
@@ -39,7 +56,7 @@ class Pace:
         Beyond the finest that is known, all of its time counts as spent on pixels. Of one kind the fastest counts: a
         slow one may be an accident.
         """
-        fastest = {1 / at**2: min(ms for other, ms in self._took if other == at) for at, _ in self._took}
+        fastest = {1 / at**2: min(took) for at, took in self._took.items()}
         finest = max(fastest, default=1.0)
         fastest |= {0.0: 0.0, 1.0: fastest.get(finest, 0.0) / finest}
         return float(np.interp(1 / coarse**2, sorted(fastest), [fastest[part] for part in sorted(fastest)]))

@@ -167,12 +167,12 @@ class Renderer:
             wanted = self._wanted
             return self._closed or (wanted is not None and (late or not wanted.is_like(request)))
 
+        plan = make_plan(scene, request.stage, size, size, method=request.method)
         try:
-            plan = make_plan(scene, request.stage, size, size, method=request.method)
             picture = enlarged(draw(plan, cancelled=given_up), request.size)
         finally:
             elapsed = 1000 * (time.perf_counter() - start)
-            self._pace.took(coarse, elapsed)
+            self._pace.took(coarse, elapsed, plan.path_name)
         frame = Drawing(request, picture, scene, 1.0, True, coarse, plan.path_name, elapsed, warnings=plan.warnings)
         self.drawing = self.whole = frame
 
@@ -189,7 +189,7 @@ class Renderer:
         """The picture in full, seen as it grows."""
         self.drawing = drawing = Drawing(request, self._canvas(request.size))
         scene, looked = self._scene(request), time.perf_counter()
-        start = looked
+        start, loaded = looked, backend.loaded()
         plan = make_plan(scene, request.stage, request.size, request.size, method=request.method)
         self.drawing = drawing = replace(drawing, scene=scene, warnings=plan.warnings, path=plan.path_name)
 
@@ -203,7 +203,8 @@ class Renderer:
 
         draw(plan, out=drawing.picture, progress=progress, cancelled=self._superseded)
         elapsed = 1000 * (time.perf_counter() - start)
-        self._pace.took(1, elapsed)
+        if loaded is backend.loaded():  # else it took the time to load the compiler too
+            self._pace.took(1, elapsed, plan.path_name)
         wrong = _wrong(request, drawing.picture)
         self.drawing = self.whole = replace(drawing, done=1.0, milliseconds=elapsed, wrong=wrong)
 
