@@ -20,6 +20,7 @@ from raytracer.twofold import (
     Number,
     Twofold,
     add,
+    dekker_product,
     divide,
     dot,
     exponent,
@@ -74,8 +75,8 @@ def kahan(origin: Vector, direction: Vector, centre: Vector, r: Number) -> Numbe
     """`stable`, with the errors of the products h² and a·c put back before one is taken from the other."""
     away = minus(origin, centre)
     a, h, c = inner(direction, direction), inner(direction, away), inner(away, away) - r * r
-    square, square_low = two_product(h, h)
-    product, product_low = two_product(a, c)
+    square, square_low = dekker_product(h, h)
+    product, product_low = dekker_product(a, c)
     return from_discriminant((square - product) + (square_low - product_low), h, a, c)
 
 

@@ -49,7 +49,12 @@ def quick_two_sum(a: Number, b: Number) -> Twofold:
 
 
 def two_product(a: Number, b: Number) -> Twofold:
-    """a · b without error (Dekker, Veltkamp); |a|, |b| below 2⁹⁹⁵."""
+    """a · b without error, in range: the kernels use a fused multiply-add for it, where the processor has one."""
+    return dekker_product(a, b)
+
+
+def dekker_product(a: Number, b: Number) -> Twofold:
+    """a · b without error (Dekker, Veltkamp); |a|, |b| below 2⁹⁹⁵. Beyond that, the same nonsense everywhere."""
     product = a * b
     far = _SPLITTER * a
     a_high = far - (far - a)

@@ -21,10 +21,11 @@ from tempfile import gettempdir
 from types import FunctionType, ModuleType
 
 import numba
+from llvmlite.binding import get_host_cpu_features
 from numba.extending import overload, register_jitable
 
 from raytracer import boxes, certified, methods, shading, twofold
-from raytracer.kernels.lanes import Mask, blend
+from raytracer.kernels.lanes import Mask, blend, fused
 
 
 @overload(twofold.select)
@@ -32,6 +33,17 @@ def _select(condition, yes, no):
     if isinstance(condition, Mask):
         return lambda condition, yes, no: blend(condition, yes, no)
     return lambda condition, yes, no: yes if condition else no
+
+
+if get_host_cpu_features().get("fma"):  # else a fused operation is a slow call, and not on every system there
+
+    @overload(twofold.two_product)
+    def _two_product(a, b):
+        def product_and_error(a, b):
+            product = a * b
+            return product, fused(a, b, -product)
+
+        return product_and_error
 
 
 @overload(twofold.exponent)
@@ -54,6 +66,8 @@ def _compile_calls_into(module: ModuleType) -> None:
 
 _SOURCES = (twofold, certified, boxes, shading, methods)
 _OVERLOADED = (twofold.select, twofold.exponent, twofold.scale)
+if get_host_cpu_features().get("fma"):
+    _OVERLOADED += (twofold.two_product,)
 for _module in _SOURCES:
     _compile_calls_into(_module)
 

@@ -54,6 +54,11 @@ def _eight_numbers(context, builder, number, lanes, value):
     return _spread(builder, context.cast(builder, value, number, types.float64))
 
 
+@lower_cast(types.Integer, Places)
+def _eight_places(context, builder, number, places, value):
+    return _spread(builder, context.cast(builder, value, number, types.int32))
+
+
 @lower_cast(types.Boolean, Mask)
 def _eight_bits(context, builder, boolean, mask, value):
     return _spread(builder, value)
@@ -133,6 +138,19 @@ def blend(typing, mask, yes, no):
     """In each lane `yes` or `no`, of which one may be a number."""
     kind = next((arg for arg in (yes, no) if isinstance(arg, (Lanes, Mask, Places))), LANES)
     return kind(mask, kind, kind), lambda context, builder, sig, args: builder.select(*args)
+
+
+@intrinsic
+def fused(typing, a, b, c):
+    """a · b + c, rounded once, of lanes or of numbers."""
+    kind = next((arg for arg in (a, b, c) if isinstance(arg, Lanes)), types.float64)
+
+    def lower(context, builder, sig, args):
+        suffix = f"v{WIDTH}f64" if kind is LANES else "f64"
+        function = ir.FunctionType(args[0].type, [arg.type for arg in args])
+        return builder.call(get_or_insert_function(builder.module, function, f"llvm.fma.{suffix}"), args)
+
+    return kind(kind, kind, kind), lower
 
 
 @intrinsic

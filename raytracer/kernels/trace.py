@@ -14,44 +14,86 @@ from raytracer.certified import (
     passes,
     refine,
 )
-from raytracer.kernels.compiler import compiled
+from raytracer.kernels.compiler import compiled, inlined
+from raytracer.kernels.lanes import WIDTH, all_of, bits_of, gather_rows, is_hit, load, spread, store
+from raytracer.twofold import select
 
 
 @compiled
 def nearest_given(origins, rays, balls, nearest):
-    """`plain.nearest_given`."""
-    best, best_error, best_index, unsure = nearest
-    for k in range(len(origins)):
-        ox, oy, oz = origins[k, 0], origins[k, 1], origins[k, 2]
+    """`plain.nearest_given`: eight rays at a time, and the rest one by one."""
+    ox, oy, oz = origins[:, 0].copy(), origins[:, 1].copy(), origins[:, 2].copy()
+    eights = len(ox) // WIDTH * WIDTH
+    for k in range(np.uint64(0), np.uint64(eights), np.uint64(WIDTH)):
+        _nearest_of_eight(ox, oy, oz, rays, balls, nearest, k)
+    for k in range(eights, len(ox)):
         for i in range(len(balls)):
-            lx, ly, lz, c, c_error, size = look(ox, oy, oz, balls[i, 0], balls[i, 1], balls[i, 2], balls[i, 3])
-            h = inner(rays.x[k], rays.y[k], rays.z[k], lx, ly, lz)
-            a, m = rays.square[k], rays.reach[k]
-            if passes(h, a, c, c_error, m * size, m):
-                continue
+            lx, ly, lz, c, c_error, size = look(ox[k], oy[k], oz[k], balls[i, 0], balls[i, 1], balls[i, 2], balls[i, 3])
+            h, a, m = inner(rays.x[k], rays.y[k], rays.z[k], lx, ly, lz), rays.square[k], rays.reach[k]
             t, error, low = meet(h, a, c, c_error, size, balls[i, 3], m, T_TOLERANCE)
-            best[k], _, best_error[k], best_index[k], unsure[k] = nearer(
-                best[k], 0.0, best_error[k], best_index[k], unsure[k], t, 0.0, error, low, i
+            nearest.t[k], _, nearest.error[k], nearest.index[k], nearest.unsure[k] = nearer(
+                nearest.t[k], 0.0, nearest.error[k], nearest.index[k], nearest.unsure[k], t, 0.0, error, low, i
             )
+
+
+@inlined
+def _nearest_of_eight(ox, oy, oz, rays, balls, nearest, k):
+    x, y, z, a, m = load(rays.x, k), load(rays.y, k), load(rays.z, k), load(rays.square, k), load(rays.reach, k)
+    best, best_error, best_index, unsure = spread(np.inf), spread(0.0), spread(np.int32(-1)), a < 0.0
+    for i in range(len(balls)):
+        cx, cy, cz, radius = balls[i, 0], balls[i, 1], balls[i, 2], balls[i, 3]
+        lx, ly, lz, c, c_error, size = look(load(ox, k), load(oy, k), load(oz, k), cx, cy, cz, radius)
+        h = inner(x, y, z, lx, ly, lz)
+        if all_of(passes(h, a, c, c_error, m * size, m)):
+            continue
+        t, error, low = meet(h, a, c, c_error, size, radius, m, T_TOLERANCE)
+        best, _, best_error, best_index, unsure = nearer(
+            best, 0.0, best_error, best_index, unsure, t, 0.0, error, low, spread(np.int32(i))
+        )
+    store(nearest.t, k, best)
+    store(nearest.error, k, best_error)
+    store(nearest.index, k, best_index)
+    bits = bits_of(unsure)
+    for lane in range(WIDTH):
+        nearest.unsure[k + np.uint64(lane)] = bits >> lane & 1
 
 
 @compiled
 def refine_given(origins, rays, balls, t, index, unsure):
-    """`plain.refine_given`."""
-    left, count = np.empty(len(t), np.int64), 0
-    for k in range(len(t)):
+    """`plain.refine_given`: eight rays at a time, and the rest one by one."""
+    ox, oy, oz = origins[:, 0].copy(), origins[:, 1].copy(), origins[:, 2].copy()
+    eights, left, count = len(t) // WIDTH * WIDTH if len(balls) else 0, np.empty(len(t), np.int64), 0
+    table = balls.reshape(-1)
+    for k in range(np.uint64(0), np.uint64(eights), np.uint64(WIDTH)):
+        bits = _refine_eight(ox, oy, oz, rays, table, t, index, k)
+        for lane in range(WIDTH):
+            place = k + np.uint64(lane)
+            if bits >> lane & 1 and not unsure[place]:
+                left[count] = place
+                count += 1
+    for k in range(eights, len(t)):
         i = index[k]
         if i >= 0 and not unsure[k]:
-            finer, sure = refine(
-                t[k], (rays.x[k], 0.0), (rays.y[k], 0.0), (rays.z[k], 0.0), origins[k, 0], origins[k, 1], origins[k, 2],
-                balls[i, 0], balls[i, 1], balls[i, 2], balls[i, 3],
-            )  # fmt: skip
+            x, y, z = (rays.x[k], 0.0), (rays.y[k], 0.0), (rays.z[k], 0.0)
+            cx, cy, cz, radius = balls[i, 0], balls[i, 1], balls[i, 2], balls[i, 3]
+            finer, sure = refine(t[k], x, y, z, ox[k], oy[k], oz[k], cx, cy, cz, radius)
             if sure:
                 t[k] = finer
             else:
                 left[count] = k
                 count += 1
     return left[:count]
+
+
+@inlined
+def _refine_eight(ox, oy, oz, rays, table, t, index, k):
+    """Refine eight hits, and return, as bits, those of which it is not certain. What is unsure is settled later."""
+    x, y, z = (load(rays.x, k), 0.0), (load(rays.y, k), 0.0), (load(rays.z, k), 0.0)
+    found, hit = load(t, k), is_hit(load(index, k))
+    cx, cy, cz, radius = gather_rows(table, select(hit, load(index, k), spread(np.int32(0))))
+    finer, sure = refine(found, x, y, z, load(ox, k), load(oy, k), load(oz, k), cx, cy, cz, radius)
+    store(t, k, select(hit & sure, finer, found))
+    return bits_of(hit & ~sure)
 
 
 @compiled
