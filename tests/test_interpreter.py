@@ -299,7 +299,9 @@ def test_both_ways_of_reading_agree(lines: list[str], end: str, has_surface: boo
     text = (SURFACE * has_surface + "".join(line + end for line in lines)).encode()
     with pytest.MonkeyPatch.context() as patch:
         slow = line_by_line(patch, text)
-    assert_equal(outcome(text), slow)
+        assert_equal(outcome(text), slow)
+        patch.setattr(reader, "_MANY_BLOCKS", 0)  # by the kernel, if there is a compiler
+        assert_equal(outcome(text), slow)
 
 
 @given(st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=4, max_size=4), st.integers(1, 17))
@@ -309,9 +311,34 @@ def test_the_fast_way_reads_what_float_reads(numbers: list[float], digits: int) 
     if inf in (radius, *map(abs, centre)) or radius == 0:
         return
     text = (SURFACE + f"sphere {' '.join(words)}\n").encode()
-    draft = reader._Draft()
-    assert reader._read_plain(draft, text)
-    assert repr(draft.spheres.numbers.tolist()) == repr([radius, *centre])
+    for read in (reader._plain_by_python, reader._plain_by_kernel):
+        draft = reader._Draft()
+        if reader._read_plain(draft, text, read):
+            assert repr(draft.spheres.numbers.tolist()) == repr([radius, *centre])
+        else:
+            assert read is reader._plain_by_kernel
+            assert any(not 1e-20 < abs(x) < 1e20 for x in (radius, *centre))
+
+
+NUMBER = st.from_regex(r"[+-]?(\d{0,12}\.?\d{0,12})([eE][+-]?\d{1,3})?", fullmatch=True)
+HALF_WAY = st.integers(2**53, 2**60).map(lambda n: str(2 * n + 1 if n % 2 else n))
+
+
+@given(st.lists(NUMBER | HALF_WAY, min_size=4, max_size=4))
+def test_the_kernel_reads_what_float_reads_or_nothing(words: list[str]) -> None:
+    found = reader._plain_by_kernel((SURFACE + f"sphere {' '.join(words)}\n").encode())
+    if found is not None:
+        assert repr(found.spheres[0].tolist()) == repr([float(word) for word in words])
+
+
+@pytest.mark.parametrize(
+    "word", ["1.2345678901234567", "-0", "+.5", "5.", "1e-20", "123456789012345678", "9007199254740993"]
+)
+def test_the_kernel_reads_usual_numbers(word: str) -> None:
+    found = reader._plain_by_kernel(f"sphere 1 {word} {word} 0\n".encode())
+    sure = word != "9007199254740993"  # half way between two float64
+    assert (found is not None) == sure
+    assert not sure or repr(found.spheres[0, 1]) == repr(np.float64(word))
 
 
 def test_plain_lines_take_the_fast_way(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -320,6 +347,8 @@ def test_plain_lines_take_the_fast_way(monkeypatch: pytest.MonkeyPatch) -> None:
     slow = line_by_line(monkeypatch, text)
     monkeypatch.setattr(reader, "_read_lines", lambda *_: pytest.fail("read line by line"))
     assert isinstance(slow, Scene)
+    assert same_bits(interpret(text), slow)
+    monkeypatch.setattr(reader, "_MANY_BLOCKS", 0)
     assert same_bits(interpret(text), slow)
 
 

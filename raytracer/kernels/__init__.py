@@ -5,6 +5,7 @@ from raytracer.kernels.compiler import cache_named_after_sources
 with cache_named_after_sources():
     from raytracer.kernels.bounds import TILE_HEIGHT, TILE_WIDTH, begin, bound, fill
     from raytracer.kernels.bvh import along_curve, build, candidates_in_tree, nearest_in_tree
+    from raytracer.kernels.reading import read_plain
     from raytracer.kernels.tiles import (
         find_fine_hits,
         find_hits,
@@ -42,6 +43,7 @@ __all__ = [
     "paint_normal",
     "polish",
     "range_of",
+    "read_plain",
     "refine_given",
     "usual_eye",
     "usual_given",
