@@ -10,6 +10,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+_CACHE_LINE = 64  # bytes
+
+
+def aligned(size: int, kind: type) -> np.ndarray:
+    """A fresh array (size,), with anything in it, that begins where a line of the processor's cache does."""
+    count = size * np.dtype(kind).itemsize
+    raw = np.empty(count + _CACHE_LINE, np.uint8)
+    start = -raw.ctypes.data % _CACHE_LINE
+    return raw[start : start + count].view(kind)
+
 
 class Hits(NamedTuple):
     """What rays hit first; whoever needs the point, the normal or the material computes it, once, from these two."""

@@ -16,6 +16,7 @@ is added for them, for frames that magnify errors by no more than `camera.invers
 
 from __future__ import annotations
 
+from functools import lru_cache
 from math import frexp, hypot, inf, ldexp, nan, sqrt
 from typing import NamedTuple
 
@@ -87,6 +88,7 @@ class Box(NamedTuple):
     ahead: Number
 
 
+@lru_cache(maxsize=8)
 def make_lens(raster: Raster) -> Lens:
     """Of a frame that magnifies rounding errors too much, one that knows no box."""
     rows, magnification = inverse_frame(raster.camera) or ([[1.0, 0.0, 0.0]] * 3, inf)

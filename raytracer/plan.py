@@ -7,14 +7,12 @@ from dataclasses import dataclass
 from functools import cached_property
 from types import ModuleType
 
-import numpy as np
-
 from raytracer import backend, plain
 from raytracer.camera import Raster, make_raster
 from raytracer.eye import Eye, open_eye
 from raytracer.methods import CERTIFIED, METHODS, check_method
 from raytracer.scene import Light, Scene
-from raytracer.stages import LIGHT_RANGE, STAGES, Stage, light_from_eye
+from raytracer.stages import LIGHT_RANGE, STAGES, Stage
 
 _TESTS_A_LIGHT = 20  # what shading by a light costs, in tests of a ray against a sphere
 
@@ -65,8 +63,9 @@ class Plan:
 
     @property
     def _has_far_lights(self) -> bool:
-        places = [light_from_eye(light, self.scene.camera, 0) for light in self.lights]
-        return bool(places) and not np.abs(places).max() < 2.0**LIGHT_RANGE
+        eye = self.scene.camera.eye
+        far = (abs(x - o) for light in self.lights for x, o in zip(light.position, eye, strict=True))
+        return not max(far, default=0.0) < 2.0**LIGHT_RANGE
 
     @property
     def shading(self) -> float:

@@ -14,6 +14,8 @@ from typing import TypeVar, overload
 
 import numpy as np
 
+from raytracer.arrays import aligned
+
 Vector = tuple[float, float, float]
 Colour = tuple[float, float, float]
 
@@ -171,8 +173,9 @@ class Spheres(_Table[Sphere]):
 
 def pack_balls(centres: np.ndarray, radii: np.ndarray) -> np.ndarray:
     """Spheres as rows x, y, z, radius: float64 (n rounded up to eights, 4), NaN in rows to spare."""
-    balls = np.full((-(-len(radii) // 8) * 8, 4), np.nan)
-    balls[: len(radii), :3], balls[: len(radii), 3] = centres, radii
+    count, rows = len(radii), -(-len(radii) // 8) * 8
+    balls = aligned(4 * rows, np.float64).reshape(rows, 4)
+    balls[:count, :3], balls[:count, 3], balls[count:] = centres, radii, np.nan
     return balls
 
 

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from functools import lru_cache
 from itertools import chain
 from queue import Empty, Full, LifoQueue
 from types import ModuleType
@@ -23,13 +24,27 @@ import numpy as np
 from numpy.lib.stride_tricks import as_strided
 
 from raytracer import plain
-from raytracer.arrays import Bins, Candidates, Canvas, FineRays, HitRows, Hits, Paints, Scratch, Seen, Sides, Slow, View
+from raytracer.arrays import (
+    Bins,
+    Candidates,
+    Canvas,
+    FineRays,
+    HitRows,
+    Hits,
+    Paints,
+    Scratch,
+    Seen,
+    Sides,
+    Slow,
+    View,
+    aligned,
+)
 from raytracer.boxes import Lens, make_lens
 from raytracer.camera import Raster, eye_grid, fine_columns, fine_rows
 from raytracer.eye import bundle_of, usable_spread
 from raytracer.plan import Plan
 from raytracer.pool import cores, share
-from raytracer.scene import Materials, Scene, Spheres
+from raytracer.scene import Colour, Materials, Scene, Spheres
 from raytracer.settle import Bundle, Index, Targets, known_in_integers, polish, settled
 from raytracer.shading import to_byte
 from raytracer.stages import light_from_eye
@@ -42,7 +57,6 @@ _FEW = 1 << 13  # spheres below which one thread sorts them sooner than two
 _MOST_WORKERS = 8  # that sort: each counts all tiles anew
 _BAND_PIXELS = 1 << 18  # of a numpy stage's block
 _PIXELS_A_MOMENT, _SPHERES_A_MOMENT = 1 << 21, 1 << 15  # what is drawn in two milliseconds or so
-_CACHE_LINE = 64  # bytes
 _KEPT = 1 << 26  # bytes of a workspace that is kept
 
 _NOT_A_NUMBER_IS_NO_ERROR = np.errstate(all="ignore")
@@ -58,7 +72,7 @@ class Workspace:
         """An array of that size, with anything in it."""
         kept = self._arrays.get((name, worker))
         if kept is None or len(kept) < size:
-            kept = self._arrays[name, worker] = _aligned(size, kind)
+            kept = self._arrays[name, worker] = aligned(size, kind)
         return kept[:size]
 
     def zeros(self, size: int, kind: type, name: str, worker: int = 0) -> np.ndarray:
@@ -69,13 +83,6 @@ class Workspace:
     @property
     def nbytes(self) -> int:
         return sum(array.nbytes for array in self._arrays.values())
-
-
-def _aligned(size: int, kind: type) -> np.ndarray:
-    """A fresh array that begins where a line of the processor's cache does."""
-    raw = np.empty(size * np.dtype(kind).itemsize + _CACHE_LINE, np.uint8)
-    start = -raw.ctypes.data % _CACHE_LINE
-    return raw[start : start + size * np.dtype(kind).itemsize].view(kind)
 
 
 _idle: LifoQueue[Workspace] = LifoQueue(2)
@@ -232,13 +239,19 @@ def open_screen(scene: Scene, raster: Raster, kernels: ModuleType, threads: int 
         yield Screen(raster, unit, origin, len(scene.spheres), order, view, slow, bins, targets, workspace, desks)
 
 
+@lru_cache(maxsize=64)
+def _bytes_of(colour: Colour) -> np.ndarray:
+    """A colour from 0 to 255, to be cut off to whole numbers: float64 (3,)."""
+    return np.asarray(to_byte(np.array(colour)))
+
+
 def make_paints(plan: Plan, screen: Screen) -> Paints:
     """What the plan's stage is painted with."""
     flat, background = plan.stage.flat(plan.scene)
     lights = [(*light_from_eye(light, plan.scene.camera, screen.unit).tolist(), *light.colour) for light in plan.lights]
     materials = plan.scene.materials
     return Paints(
-        to_byte(np.array(background)), to_byte(np.array(flat)), np.array(lights, np.float64).reshape(-1, 6),
+        _bytes_of(background), _bytes_of(flat), np.array(lights, np.float64).reshape(-1, 6),
         plan.scene.spheres.material, materials.diffuse.reshape(-1),
     )  # fmt: skip
 
