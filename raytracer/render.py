@@ -155,7 +155,7 @@ def _paint_whole(plan: Plan, screen: Screen, picture: np.ndarray, watch: Watch) 
         return slice(rows.start, rows.start)
 
     def paint(rows: slice, worker: int) -> slice:
-        scratch, _ = screen.desks[worker]
+        scratch = screen.desks[worker].scratch
         painter(*hits, near, far, rows.start, rows.stop, width, scratch, paints, canvas)
         return rows
 

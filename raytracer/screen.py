@@ -100,6 +100,13 @@ def _workspace() -> Iterator[Workspace]:
             _idle.put_nowait(workspace)
 
 
+class Desk(NamedTuple):
+    """What one thread works with."""
+
+    scratch: Scratch
+    doubts: np.ndarray  # int64: how many doubtful pixels follow; each as row · width + column
+
+
 class Screen(NamedTuple):
     """A picture's spheres, sorted into the tiles of the screen."""
 
@@ -113,9 +120,7 @@ class Screen(NamedTuple):
     bins: Bins
     targets: Targets
     workspace: Workspace
-    desks: list[
-        tuple[Scratch, np.ndarray]
-    ]  # of each thread, and its list of doubtful pixels, which begins with a length
+    desks: list[Desk]  # one a thread
 
     @property
     def boxes(self) -> np.ndarray:
@@ -128,9 +133,8 @@ class Screen(NamedTuple):
         """The picture's rows, cut between tiles into some pieces for each core, so that all are done at one time."""
         height = self.kernels.TILE_HEIGHT
         rows, pixels = -(-self.raster.height // height), self.raster.height * self.raster.width
-        moments = (len(self.slow.ids) + shading / 8) * pixels / _PIXELS_A_MOMENT + len(
-            self.bins.ids
-        ) / _SPHERES_A_MOMENT
+        moments = (len(self.slow.ids) + shading / 8) * pixels / _PIXELS_A_MOMENT
+        moments += len(self.bins.ids) / _SPHERES_A_MOMENT
         step = max(1, min(rows // max(4 * cores(), int(moments)), _BAND_PIXELS // (height * self.raster.width)))
         cuts = [row * height for row in range(0, rows, step)]
         return [slice(a, b) for a, b in zip(cuts, [*cuts[1:], self.raster.height], strict=True)]
@@ -197,7 +201,7 @@ class Screen(NamedTuple):
 
     def doubtful(self, *workers: int) -> Iterator[Pixels]:
         """The doubtful pixels that these workers have listed, all together, if there are any."""
-        lists = [self.desks[worker][1] for worker in workers]
+        lists = [self.desks[worker].doubts for worker in workers]
         pixels = np.concatenate([doubts[1 : 1 + doubts[0]] for doubts in lists])
         if pixels.size:
             for doubts in lists:
@@ -274,7 +278,7 @@ def make_canvas(picture: np.ndarray) -> Canvas | None:
     return Canvas(flat, row, pixel, width if pixel == 3 else width - 1)
 
 
-def _desk(workspace: Workspace, kernels: ModuleType, worker: int) -> tuple[Scratch, np.ndarray]:
+def _desk(workspace: Workspace, kernels: ModuleType, worker: int) -> Desk:
     size, array = kernels.TILE_HEIGHT * kernels.STRIDE, workspace.array
     doubts = array(_DOUBTS, np.int64, "doubts", worker)
     doubts[0] = 0
@@ -285,7 +289,7 @@ def _desk(workspace: Workspace, kernels: ModuleType, worker: int) -> tuple[Scrat
         array(64, np.float64, "batch", worker),
         array(32, np.uint8, "rest", worker),
     )
-    return scratch, doubts
+    return Desk(scratch, doubts)
 
 
 def _view(raster: Raster, origin: np.ndarray, balls: np.ndarray) -> View:
