@@ -17,6 +17,7 @@ from math import radians, tan
 from pathlib import Path
 from statistics import quantiles
 from tempfile import TemporaryDirectory
+from time import sleep
 from typing import NamedTuple
 
 import numpy as np
@@ -38,6 +39,7 @@ SMALLEST, LARGEST, FILLING = 0.3, 1.3, 1.6
 _MATERIALS = 64
 _STEP = 0.01  # of the camera between two pictures
 _DECIMALS = 6
+_REST = 0.01  # seconds before a call, in which threads of the one before may go to sleep
 _SHARES = 4  # of time, of a first call, after which there is no second
 
 Progress = Callable[[str], object]
@@ -201,6 +203,7 @@ def interleaved(lanes: Mapping[str, Lane], rounds: int, seconds: float) -> dict[
     for turn in range(rounds):
         for name in order[turn % len(order) :] + order[: turn % len(order)]:
             if spent[name] < (seconds if noted[name] else _SHARES * seconds):
+                sleep(_REST)
                 used, note = lanes[name](turn + 1)
                 spent[name] += used
                 noted[name].append(note)
