@@ -172,15 +172,17 @@ def directions_of(grid: Grid, across: np.ndarray, up: np.ndarray) -> Vectors:
     return x, y, z
 
 
+@lru_cache(maxsize=8)
 def fine_columns(raster: Raster) -> Twofold:
     """U of each column in two-fold float64: two arrays (width,)."""
     across, _ = raster.numerators(np.arange(raster.width), 0)
     return _ratio(across.astype(float), float(raster.height))
 
 
-def fine_rows(raster: Raster, rows: slice) -> tuple[Twofold, Twofold, Twofold]:
-    """V·v − d·w of some rows in two-fold float64: for each component two arrays (rows,)."""
-    _, up = raster.numerators(0, np.arange(rows.start, rows.stop))
+@lru_cache(maxsize=8)
+def fine_rows(raster: Raster) -> tuple[Twofold, Twofold, Twofold]:
+    """V·v − d·w of each row in two-fold float64: for each component two arrays (height,)."""
+    _, up = raster.numerators(0, np.arange(raster.height))
     fine_up, back = _ratio(up.astype(float), float(raster.height)), focal_length(raster.camera.fov)
     x, y, z = (
         add(*multiply(*fine_up, v, 0.0), *two_product(-back, w))

@@ -77,8 +77,9 @@ class Eye(NamedTuple):
     def _refine(self, hits: Hits, rows: slice, which: np.ndarray) -> np.ndarray:
         """Bring the t of these hits to the last digit, and return those of which that is not certain."""
         ys, xs = which.nonzero()
+        ys += rows.start
         across, low = fine_columns(self.raster)
-        components = zip(self.grid.u, fine_rows(self.raster, rows), strict=True)
+        components = zip(self.grid.u, fine_rows(self.raster), strict=True)
         x, y, z = (fine_direction(across[xs], low[xs], u, rest[ys], rest_low[ys]) for u, (rest, rest_low) in components)
         balls = self.targets.balls[hits.index[which]]
         t, sure = refine(hits.t[which], x, y, z, *xyz(self.origin), *xyz(balls), balls[:, 3])

@@ -202,11 +202,14 @@ def hits_of(plan: Plan, tracer: Eye | Screen, watch: Watch | None = None, polish
     hits = _no_hits(slice(0, plan.raster.height), plan.raster.width)
 
     def trace(rows: slice, worker: int) -> slice:
-        hits.t[rows], hits.index[rows] = tracer.hits(rows, worker, polished)
+        if isinstance(tracer, Screen):
+            tracer.find(Hits(hits.t[rows], hits.index[rows]), rows, worker, polished)
+        else:
+            hits.t[rows], hits.index[rows] = tracer.hits(rows, worker, polished)
         return slice(rows.start, rows.start)
 
     share_bands(tracer, plan, watch or Watch(), trace)
-    return hits
+    return tracer.in_scene(hits) if isinstance(tracer, Screen) else hits
 
 
 def eye_hits(

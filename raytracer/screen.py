@@ -172,8 +172,8 @@ class Screen(NamedTuple):
 
     def _fine_rays(self, rows: slice) -> FineRays:
         _, low = fine_columns(self.raster)
-        x, y, z = fine_rows(self.raster, rows)
-        return FineRays(np.concatenate([low, np.zeros(8)]), *x, *y, *z)
+        parts = (part[rows] for component in fine_rows(self.raster) for part in component)
+        return FineRays(np.concatenate([low, np.zeros(SPARE)]), *parts)
 
     def in_scene(self, hits: Hits) -> Hits:
         """t in the scene's unit of length, and places in the file in place of numbers of spheres."""
