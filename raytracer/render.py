@@ -160,6 +160,7 @@ def _paint_whole(plan: Plan, screen: Screen, picture: np.ndarray, watch: Watch) 
         return rows
 
     share_bands(screen, plan, watch, find)
+    screen.settle(Hits(t, index), 0, *range(len(screen.desks)))
     painter, (near, far) = getattr(plan.path, plan.painter), screen.range_of(t, index)
     share_bands(screen, plan, watch, paint)
 
@@ -209,7 +210,10 @@ def hits_of(plan: Plan, tracer: Eye | Screen, watch: Watch | None = None, polish
         return slice(rows.start, rows.start)
 
     share_bands(tracer, plan, watch or Watch(), trace)
-    return tracer.in_scene(hits) if isinstance(tracer, Screen) else hits
+    if isinstance(tracer, Screen):
+        tracer.settle(hits, 0, *range(len(tracer.desks)), polished=polished)
+        return tracer.in_scene(hits)
+    return hits
 
 
 def eye_hits(

@@ -15,7 +15,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from functools import lru_cache
-from itertools import chain
 from queue import Empty, Full, LifoQueue
 from types import ModuleType
 from typing import NamedTuple
@@ -144,20 +143,26 @@ class Screen(NamedTuple):
         shape = rows.stop - rows.start, self.raster.width
         hits = Hits(np.empty(shape), np.empty(shape, np.int32))
         self.find(hits, rows, worker, polished)
+        self.settle(hits, rows.start, worker, polished=polished)
         return self.in_scene(hits)
 
     @_NOT_A_NUMBER_IS_NO_ERROR
     def find(self, hits: Hits, rows: slice, worker: int, polished: bool = False) -> None:
-        """`hits`, into arrays, in units, and with numbers of spheres."""
+        """`hits`, into arrays, in units, and with numbers of spheres; what is left to do, `settle` does."""
         out = HitRows(hits.t.reshape(-1), hits.index.reshape(-1), rows.start, self.raster.width)
         kernel, paints = ("find_fine_hits", self._fine_rays(rows)) if polished else ("find_hits", _NO_PAINTS)
-        for doubtful in chain(self.paint(kernel, rows, worker, paints, out), self.doubtful(worker)):
-            where = doubtful.ys - rows.start, doubtful.xs
-            hits.t[where], hits.index[where] = doubtful.hits()
+        for doubtful in self.paint(kernel, rows, worker, paints, out):
+            doubtful.decide(hits, rows.start)
+
+    @_NOT_A_NUMBER_IS_NO_ERROR
+    def settle(self, hits: Hits, first_row: int, *workers: int, polished: bool = False) -> None:
+        """Decide what these workers have listed as doubtful, and polish t where that is still to be done."""
+        for doubtful in self.doubtful(*workers):
+            doubtful.decide(hits, first_row)
         if polished and np.isnan(hits.t).any():
             ys, xs = np.nonzero(np.isnan(hits.t))
             some = Hits(hits.t[ys, xs], hits.index[ys, xs])
-            polish(some, (np.arange(len(xs)),), Pixels(self, xs, ys + rows.start), self.targets)
+            polish(some, (np.arange(len(xs)),), Pixels(self, xs, ys + first_row), self.targets)
             hits.t[ys, xs] = some.t
 
     def room_for_hits(self) -> Hits:
@@ -221,6 +226,11 @@ class Pixels(NamedTuple):
     def hits(self) -> Hits:
         """What they hit, certain."""
         return settled(self, (np.arange(len(self.xs)),), self.screen.targets)
+
+    def decide(self, hits: Hits, first_row: int) -> None:
+        """Put what they hit into the hits of the rows from first_row on."""
+        where = self.ys - first_row, self.xs
+        hits.t[where], hits.index[where] = self.hits()
 
     def bundle(self, which: Index) -> Bundle:
         return bundle_of(self.screen.raster, self.screen.origin, self.xs[which], self.ys[which])
