@@ -238,10 +238,10 @@ class Paints(NamedTuple):
 
 
 class FineRays(NamedTuple):
-    """What the directions of some rows need for twice the digits: see `certified.fine_direction`."""
+    """What the directions of a picture need for twice the digits: see `certified.fine_direction`."""
 
     across_low: np.ndarray  # the rest of U, eight elements to spare
-    x: np.ndarray  # V·v − d·w, its components and their rests, (rows,)
+    x: np.ndarray  # V·v − d·w, its components and their rests, (height,)
     x_low: np.ndarray
     y: np.ndarray
     y_low: np.ndarray

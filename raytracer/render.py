@@ -151,7 +151,7 @@ def _paint_whole(plan: Plan, screen: Screen, picture: np.ndarray, watch: Watch) 
     t, index = (array[:-SPARE].reshape(shape) for array in hits)
 
     def find(rows: slice, worker: int) -> slice:
-        screen.find(Hits(t[rows], index[rows]), rows, worker)
+        screen.find(Hits(t, index), 0, rows, worker)
         return slice(rows.start, rows.start)
 
     def paint(rows: slice, worker: int) -> slice:
@@ -204,7 +204,7 @@ def hits_of(plan: Plan, tracer: Eye | Screen, watch: Watch | None = None, polish
 
     def trace(rows: slice, worker: int) -> slice:
         if isinstance(tracer, Screen):
-            tracer.find(Hits(hits.t[rows], hits.index[rows]), rows, worker, polished)
+            tracer.find(hits, 0, rows, worker, polished)
         else:
             hits.t[rows], hits.index[rows] = tracer.hits(rows, worker, polished)
         return slice(rows.start, rows.start)

@@ -142,17 +142,20 @@ class Screen(NamedTuple):
         """What the rays of these rows, cut between tiles, hit first: as `Eye.hits`."""
         shape = rows.stop - rows.start, self.raster.width
         hits = Hits(np.empty(shape), np.empty(shape, np.int32))
-        self.find(hits, rows, worker, polished)
+        self.find(hits, rows.start, rows, worker, polished)
         self.settle(hits, rows.start, worker, polished=polished)
         return self.in_scene(hits)
 
     @_NOT_A_NUMBER_IS_NO_ERROR
-    def find(self, hits: Hits, rows: slice, worker: int, polished: bool = False) -> None:
-        """`hits`, into arrays, in units, and with numbers of spheres; what is left to do, `settle` does."""
-        out = HitRows(hits.t.reshape(-1), hits.index.reshape(-1), rows.start, self.raster.width)
-        kernel, paints = ("find_fine_hits", self._fine_rays(rows)) if polished else ("find_hits", _NO_PAINTS)
+    def find(self, hits: Hits, first_row: int, rows: slice, worker: int, polished: bool = False) -> None:
+        """`hits` of some rows, in units, and with numbers of spheres; what is left to do, `settle` does.
+
+        The arrays begin with first_row, and hold all rows that this worker is given until it settles.
+        """
+        out = HitRows(hits.t.reshape(-1), hits.index.reshape(-1), first_row, self.raster.width)
+        kernel, paints = ("find_fine_hits", self._fine_rays()) if polished else ("find_hits", _NO_PAINTS)
         for doubtful in self.paint(kernel, rows, worker, paints, out):
-            doubtful.decide(hits, rows.start)
+            doubtful.decide(hits, first_row)
 
     @_NOT_A_NUMBER_IS_NO_ERROR
     def settle(self, hits: Hits, first_row: int, *workers: int, polished: bool = False) -> None:
@@ -175,10 +178,10 @@ class Screen(NamedTuple):
         near, far = self.kernels.range_of(t.reshape(-1), index.reshape(-1))
         return near, far
 
-    def _fine_rays(self, rows: slice) -> FineRays:
+    def _fine_rays(self) -> FineRays:
         _, low = fine_columns(self.raster)
-        parts = (part[rows] for component in fine_rows(self.raster) for part in component)
-        return FineRays(np.concatenate([low, np.zeros(SPARE)]), *parts)
+        x, y, z = fine_rows(self.raster)
+        return FineRays(np.concatenate([low, np.zeros(SPARE)]), *x, *y, *z)
 
     def in_scene(self, hits: Hits) -> Hits:
         """t in the scene's unit of length, and places in the file in place of numbers of spheres."""

@@ -76,6 +76,8 @@ def test_doubts_that_do_not_fit_their_list_are_decided_on_the_way(monkeypatch):
     found = eye_hits(scene, 200, 200)
     np.testing.assert_array_equal(found.index, expected.index)
     np.testing.assert_array_equal(found.t, expected.t)
+    for stage in PAINTED:
+        np.testing.assert_array_equal(drawn(scene, stage, 200, 200, KERNELS), drawn(scene, stage, 200, 200, plain))
 
 
 @pytest.mark.parametrize("width", [64, 75, 203])

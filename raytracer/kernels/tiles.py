@@ -219,7 +219,7 @@ def _fine_hits_tile(view, scratch, tile, fine, out):
     """t to the last digit, and index; where that is not certain, NaN."""
     for row in range(tile.top, tile.bottom):
         a1, a0, _, _, _ = _line(view, row)
-        start, r = np.uint64((row - out.first_row) * out.width), np.uint64(row - out.first_row)
+        start, r = np.uint64((row - out.first_row) * out.width), np.uint64(row)
         for x in range(tile.left, tile.right, WIDTH):
             across, place, at = load(view.across, x), _place(tile, row, x), start + np.uint64(x)
             index, low, u, eye = load(scratch.index, place), load(fine.across_low, x), view.u, view.eye
