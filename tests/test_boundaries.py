@@ -96,3 +96,15 @@ def test_machine_code_is_kept_elsewhere_where_the_package_cannot_be_written_to(t
         f"print(len(list(pathlib.Path({str(tmp_path)!r}).rglob('*.nbi'))) > 0)\n"
     )
     assert in_a_fresh_process(code) == "2.0\nTrue\n"
+
+
+def test_machine_code_is_found_again_by_the_next_process():
+    code = (
+        "import raytracer.kernels as kernels\n"
+        "from raytracer import interpreter, make_plan\n"
+        "from raytracer.render import draw\n"
+        "draw(make_plan(interpreter('scenes/01_one_sphere.cli'), 'hit', 9, 9, path=kernels))\n"
+        "print(sum(kernels.paint_flat.stats.cache_misses.values()))\n"
+    )
+    in_a_fresh_process(code)
+    assert in_a_fresh_process(code) == "0\n"

@@ -103,6 +103,16 @@ borrowing = partial(compiled, _nrt=False)
 inlined = partial(borrowing, forceinline=True)
 
 
+def variant(template: FunctionType, name: str, compile_=borrowing, **names):
+    """A kernel made of a function that names some others which are not defined: those given here.
+
+    It closes over nothing. Of what closes over a kernel, numba finds no machine code again in another process.
+    """
+    function = FunctionType(template.__code__, {**template.__globals__, **names}, name)
+    function.__module__, function.__qualname__ = template.__module__, name
+    return compile_(function)
+
+
 @contextmanager
 def cache_named_after_sources() -> Iterator[None]:
     """While this lasts, kernels that are defined take their machine code from, and put it into, that folder."""

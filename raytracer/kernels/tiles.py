@@ -11,7 +11,7 @@ import numpy as np
 from raytracer.arrays import Tile
 from raytracer.certified import fine_direction, refine
 from raytracer.kernels.bounds import TILE_HEIGHT, TILE_WIDTH
-from raytracer.kernels.compiler import borrowing, inlined
+from raytracer.kernels.compiler import borrowing, inlined, variant
 from raytracer.kernels.lanes import (
     WIDTH,
     any_of,
@@ -31,25 +31,19 @@ from raytracer.shading import cosine, land, to_byte, towards
 from raytracer.twofold import select
 
 
-def _build(paint_tile, fill_tile, see=see_tile):
-    """The loop over tiles for a painter, and for one of tiles that hit nothing."""
-
-    @borrowing
-    def paint(view, slow, bins, first, last, scratch, doubts, paints, out):
-        """Paint tiles from first on, before last; returns the first that was not, for want of room for doubts."""
-        for number in range(first, last):
-            if len(doubts) - doubts[0] <= TILE_WIDTH * TILE_HEIGHT:
-                return number
-            tile = _tile(view, bins, number)
-            if len(slow.ids) == 0 and bins.starts[number] == bins.starts[number + 1]:
-                fill_tile(scratch, tile, paints, out)
-                continue
-            if see(view, slow, bins, tile, scratch):
-                list_doubts(view, tile, scratch, doubts)
-            paint_tile(view, scratch, tile, paints, out)
-        return last
-
-    return paint
+def _paint(view, slow, bins, first, last, scratch, doubts, paints, out):
+    """Paint tiles from first on, before last; returns the first that was not, for want of room for doubts."""
+    for number in range(first, last):
+        if len(doubts) - doubts[0] <= TILE_WIDTH * TILE_HEIGHT:
+            return number
+        tile = _tile(view, bins, number)
+        if len(slow.ids) == 0 and bins.starts[number] == bins.starts[number + 1]:
+            fill_tile(scratch, tile, paints, out)
+            continue
+        if see(view, slow, bins, tile, scratch):
+            list_doubts(view, tile, scratch, doubts)
+        paint_tile(view, scratch, tile, paints, out)
+    return last
 
 
 @inlined
@@ -96,9 +90,7 @@ def _flat_tile(view, scratch, tile, paints, out):
             put_lanes(out, row, x, tile.right, red, green, blue, scratch)
 
 
-@borrowing
-def _diffuse_tile(view, scratch, tile, paints, out):
-    """`stages.diffuse`."""
+def _shaded_tile(view, scratch, tile, paints, out):
     for row in range(tile.top, tile.bottom):
         line = _line(view, row)
         for x in range(tile.left, tile.right, WIDTH):
@@ -110,33 +102,28 @@ def _diffuse_tile(view, scratch, tile, paints, out):
                 continue
             where = select(hit, index, spread(largest_of(index)))
             p, n, radius = _surface(view, line, load(scratch.k, place), x, where)
-            red, green, blue, light = spread(0.0), spread(0.0), spread(0.0), paints.lights
-            for i in range(np.uint64(len(light))):
-                facing, square = towards(p, n, (light[i, 0], light[i, 1], light[i, 2]))
-                shine = cosine(facing, square, radius)
-                red, green, blue = red + light[i, 3] * shine, green + light[i, 4] * shine, blue + light[i, 5] * shine
-            r, g, b, _ = _colours(paints, where)
-            red, green, blue = _over(paints, hit, to_byte(red * r), to_byte(green * g), to_byte(blue * b))
+            red, green, blue = shade(paints, p, n, radius, where)
+            red, green, blue = _over(paints, hit, red, green, blue)
             put_lanes(out, row, x, tile.right, red, green, blue, scratch)
 
 
-@borrowing
-def _normal_tile(view, scratch, tile, paints, out):
+@inlined
+def _diffuse(paints, p, n, radius, where):
+    """`stages.diffuse`."""
+    red, green, blue, light = spread(0.0), spread(0.0), spread(0.0), paints.lights
+    for i in range(np.uint64(len(light))):
+        facing, square = towards(p, n, (light[i, 0], light[i, 1], light[i, 2]))
+        shine = cosine(facing, square, radius)
+        red, green, blue = red + light[i, 3] * shine, green + light[i, 4] * shine, blue + light[i, 5] * shine
+    r, g, b, _ = _colours(paints, where)
+    return to_byte(red * r), to_byte(green * g), to_byte(blue * b)
+
+
+@inlined
+def _normal(paints, p, n, radius, where):
     """`stages.normal`."""
-    for row in range(tile.top, tile.bottom):
-        line = _line(view, row)
-        for x in range(tile.left, tile.right, WIDTH):
-            place = _place(tile, row, x)
-            index = load(scratch.index, place)
-            hit = is_hit(index)
-            if not any_of(hit):
-                _put_background(out, row, x, tile.right, paints, scratch)
-                continue
-            where = select(hit, index, spread(largest_of(index)))
-            _, n, radius = _surface(view, line, load(scratch.k, place), x, where)
-            red, green, blue = (n[0] / radius + 1.0) / 2.0, (n[1] / radius + 1.0) / 2.0, (n[2] / radius + 1.0) / 2.0
-            red, green, blue = _over(paints, hit, to_byte(red), to_byte(green), to_byte(blue))
-            put_lanes(out, row, x, tile.right, red, green, blue, scratch)
+    red, green, blue = (n[0] / radius + 1.0) / 2.0, (n[1] / radius + 1.0) / 2.0, (n[2] / radius + 1.0) / 2.0
+    return to_byte(red), to_byte(green), to_byte(blue)
 
 
 @inlined
@@ -251,9 +238,13 @@ def _no_hits_tile(scratch, tile, paints, out):
             out.t[x], out.index[x] = np.inf, -1
 
 
-paint_flat = _build(_flat_tile, _fill_tile)
-paint_diffuse = _build(_diffuse_tile, _fill_tile)
-paint_diffuse_unchecked = _build(_diffuse_tile, _fill_tile, see_tile_unchecked)
-paint_normal = _build(_normal_tile, _fill_tile)
-find_hits = _build(_hits_tile, _no_hits_tile)
-find_fine_hits = _build(_fine_hits_tile, _no_hits_tile)
+_diffuse_tile = variant(_shaded_tile, "_diffuse_tile", shade=_diffuse)
+_normal_tile = variant(_shaded_tile, "_normal_tile", shade=_normal)
+paint_flat = variant(_paint, "paint_flat", paint_tile=_flat_tile, fill_tile=_fill_tile, see=see_tile)
+paint_diffuse = variant(_paint, "paint_diffuse", paint_tile=_diffuse_tile, fill_tile=_fill_tile, see=see_tile)
+paint_diffuse_unchecked = variant(
+    _paint, "paint_diffuse_unchecked", paint_tile=_diffuse_tile, fill_tile=_fill_tile, see=see_tile_unchecked
+)
+paint_normal = variant(_paint, "paint_normal", paint_tile=_normal_tile, fill_tile=_fill_tile, see=see_tile)
+find_hits = variant(_paint, "find_hits", paint_tile=_hits_tile, fill_tile=_no_hits_tile, see=see_tile)
+find_fine_hits = variant(_paint, "find_fine_hits", paint_tile=_fine_hits_tile, fill_tile=_no_hits_tile, see=see_tile)

@@ -14,33 +14,27 @@ import numpy as np
 
 from raytracer.certified import K_ERROR, approach, arrive, edge_of, inner, meet, side_of
 from raytracer.kernels.bounds import TILE_HEIGHT, TILE_WIDTH
-from raytracer.kernels.compiler import borrowing, compiled, inlined
+from raytracer.kernels.compiler import borrowing, compiled, inlined, variant
 from raytracer.kernels.lanes import WIDTH, any_of, bits_of, blend, fetch_ahead, gather_rows, load, spread, store
 
 STRIDE = TILE_WIDTH + WIDTH
 _AHEAD = 24  # list entries: how long before it is wanted a sphere is fetched
 
 
-def _build(draw_row):
-    """What fills the depth buffer of a tile, by a function that draws one sphere in one row."""
-
-    @borrowing
-    def see(view, slow, bins, tile, scratch):
-        """Fill the depth buffer of a tile; returns whether there are doubts."""
-        for p in range(np.uint64(0), np.uint64(TILE_HEIGHT * STRIDE), np.uint64(WIDTH)):
-            store(scratch.k, p, spread(np.inf))
-            store(scratch.index, p, spread(np.int32(-1)))
-        doubts = False
-        for i in range(len(slow.ids)):
-            doubts |= _draw_slow(view, slow, i, tile, scratch)
-        end = bins.starts[tile.number + 1]
-        for first in range(bins.starts[tile.number], end, WIDTH):
-            _look_at_eight(view, bins, first, scratch)
-            for j in range(np.uint64(0), np.uint64(min(WIDTH, end - first))):
-                doubts |= _draw(draw_row, view, bins, np.uint64(first) + j, j, tile, scratch)
-        return doubts
-
-    return see
+def _see(view, slow, bins, tile, scratch):
+    """Fill the depth buffer of a tile; returns whether there are doubts."""
+    for p in range(np.uint64(0), np.uint64(TILE_HEIGHT * STRIDE), np.uint64(WIDTH)):
+        store(scratch.k, p, spread(np.inf))
+        store(scratch.index, p, spread(np.int32(-1)))
+    doubts = False
+    for i in range(len(slow.ids)):
+        doubts |= _draw_slow(view, slow, i, tile, scratch)
+    end = bins.starts[tile.number + 1]
+    for first in range(bins.starts[tile.number], end, WIDTH):
+        _look_at_eight(view, bins, first, scratch)
+        for j in range(np.uint64(0), np.uint64(min(WIDTH, end - first))):
+            doubts |= _draw(draw_row, view, bins, np.uint64(first) + j, j, tile, scratch)
+    return doubts
 
 
 @inlined
@@ -72,9 +66,8 @@ def _draw(draw_row, view, bins, place, j, tile, scratch):
     return doubts
 
 
-@inlined
 def _draw_row(view, i, line, tile, start, stop, hu, hr, c, edge, scratch):
-    """One quick sphere in one row of its box; returns whether there are doubts."""
+    """Returns whether there are doubts."""
     row, doubts = np.uint64(tile.top + line), False
     a2, a1, a0 = view.a2, view.a1[row], view.a0[row]
     x, end, p = np.uint64(tile.left + start), np.uint64(tile.left + stop), np.uint64(line * STRIDE + start)
@@ -83,28 +76,12 @@ def _draw_row(view, i, line, tile, start, stop, hu, hr, c, edge, scratch):
         a = (across * a2 + a1) * across + a0
         k, wins, doubt = approach(across * hu + hr, a, c, edge, best)
         _keep(scratch, p, wins, k, best, i)
-        if any_of(doubt):
+        if certain and any_of(doubt):
             _note(scratch.doubt, p, bits_of(doubt))
             doubts = True
         x += np.uint64(WIDTH)
         p += np.uint64(WIDTH)
     return doubts
-
-
-@inlined
-def _draw_row_unchecked(view, i, line, tile, start, stop, hu, hr, c, edge, scratch):
-    """The same with no doubts: to measure what certainty costs."""
-    row = np.uint64(tile.top + line)
-    a2, a1, a0 = view.a2, view.a1[row], view.a0[row]
-    x, end, p = np.uint64(tile.left + start), np.uint64(tile.left + stop), np.uint64(line * STRIDE + start)
-    while x < end:
-        across, best = load(view.across, x), load(scratch.k, p)
-        a = (across * a2 + a1) * across + a0
-        k, wins, _ = approach(across * hu + hr, a, c, edge, best)
-        _keep(scratch, p, wins, k, best, i)
-        x += np.uint64(WIDTH)
-        p += np.uint64(WIDTH)
-    return False
 
 
 @inlined
@@ -158,7 +135,10 @@ def list_doubts(view, tile, scratch, doubts):
     scratch.doubt[:] = False
 
 
-see_tile, see_tile_unchecked = _build(_draw_row), _build(_draw_row_unchecked)
+_certain_row = variant(_draw_row, "_certain_row", inlined, certain=True)
+_unchecked_row = variant(_draw_row, "_unchecked_row", inlined, certain=False)  # to measure what certainty costs
+see_tile = variant(_see, "see_tile", draw_row=_certain_row)
+see_tile_unchecked = variant(_see, "see_tile_unchecked", draw_row=_unchecked_row)
 
 
 @compiled
