@@ -173,7 +173,7 @@ class Tree(NamedTuple):
 
 
 class View(NamedTuple):
-    """A picture's rays and its spheres, for the kernels; `across` has eight elements to spare."""
+    """A picture's rays and its spheres, for the kernels; beyond its columns are eight to spare, beyond its rows is one."""
 
     across: np.ndarray  # the fields of Grid
     up: np.ndarray
@@ -187,6 +187,7 @@ class View(NamedTuple):
     kappa: float  # see `plain.see`
     eye: tuple[float, float, float]
     balls: np.ndarray  # float64, flat: x, y, z, radius of each sphere
+    material: np.ndarray  # int32: of each sphere, a row of `Paints.colours`
 
 
 class Slow(NamedTuple):
@@ -198,12 +199,15 @@ class Slow(NamedTuple):
 
 
 class Bins(NamedTuple):
-    """Which of the other spheres reach into which tile."""
+    """Which of the other spheres reach into which tile.
+
+    A list's entries ascend by sphere:    bottom | top | right | left   of its box within the tile, a byte each
+                                          sphere                        in the lower half
+    """
 
     boxes: np.ndarray  # int32, flat: left, right, top, bottom of each sphere of the scene
     starts: np.ndarray  # int64 (tiles + 1,)
-    ids: np.ndarray  # int32: the list of tile i is ids[starts[i] : starts[i + 1]], ascending; some more to spare
-    corners: np.ndarray  # uint32, for each list entry: left, right, top, bottom within the tile, a byte each
+    entries: np.ndarray  # uint64: the list of tile i is entries[starts[i] : starts[i + 1]]; some more to spare
     columns: int  # tiles side by side
 
 
@@ -233,7 +237,6 @@ class Paints(NamedTuple):
     background: np.ndarray  # float64 (3,), from 0 to 255
     flat: np.ndarray  # float64 (3,), likewise: the one colour of a stage that has but one
     lights: np.ndarray  # float64 (n, 6): the place as seen from the eye, the colour
-    material: np.ndarray  # int32 (spheres,), a row of colours
     colours: np.ndarray  # float64, flat: red, green, blue, 0 of each material
 
 

@@ -133,7 +133,7 @@ class Screen(NamedTuple):
         height = self.kernels.TILE_HEIGHT
         rows, pixels = -(-self.raster.height // height), self.raster.height * self.raster.width
         moments = (len(self.slow.ids) + shading / 8) * pixels / _PIXELS_A_MOMENT
-        moments += len(self.bins.ids) / _SPHERES_A_MOMENT
+        moments += len(self.bins.entries) / _SPHERES_A_MOMENT
         step = max(1, min(rows // max(4 * cores(), int(moments)), _BAND_PIXELS // (height * self.raster.width)))
         cuts = [row * height for row in range(0, rows, step)]
         return [slice(a, b) for a, b in zip(cuts, [*cuts[1:], self.raster.height], strict=True)]
@@ -248,7 +248,7 @@ def open_screen(scene: Scene, raster: Raster, kernels: ModuleType, threads: int 
     """Sort the scene's spheres into the tiles of the screen. It holds until the context ends."""
     with _workspace() as workspace, np.errstate(all="ignore"):
         unit, origin, balls = sphere_units(scene.camera.eye, scene.spheres)
-        lens, view = make_lens(raster), _view(raster, origin, balls)
+        lens, view = make_lens(raster), _view(raster, origin, balls, scene.spheres.material)
         bins, slow_ids = _sort(workspace, kernels, lens, view, len(scene.spheres), threads)
         slow, targets = _slow(lens, view, origin, balls, slow_ids, kernels, bins)
         desks = [_desk(workspace, kernels, worker) for worker in range(threads or cores())]
@@ -266,14 +266,13 @@ def make_paints(plan: Plan, screen: Screen) -> Paints:
     """What the plan's stage is painted with."""
     flat, background = plan.stage.flat(plan.scene)
     lights = [(*light_from_eye(light, plan.scene.camera, screen.unit).tolist(), *light.colour) for light in plan.lights]
-    materials = plan.scene.materials
     return Paints(
         _bytes_of(background), _bytes_of(flat), np.array(lights, np.float64).reshape(-1, 6),
-        plan.scene.spheres.material, materials.diffuse.reshape(-1),
+        plan.scene.materials.diffuse.reshape(-1),
     )  # fmt: skip
 
 
-_NO_PAINTS = Paints(np.zeros(3), np.zeros(3), np.empty((0, 6)), Spheres().material, Materials().diffuse.reshape(-1))
+_NO_PAINTS = Paints(np.zeros(3), np.zeros(3), np.empty((0, 6)), Materials().diffuse.reshape(-1))
 
 
 _NO_SPHERES = np.empty(0)
@@ -292,7 +291,7 @@ def make_canvas(picture: np.ndarray) -> Canvas | None:
 
 
 def _desk(workspace: Workspace, kernels: ModuleType, worker: int) -> Desk:
-    size, array = kernels.TILE_HEIGHT * kernels.STRIDE, workspace.array
+    size, array = (kernels.TILE_HEIGHT + 1) * kernels.STRIDE, workspace.array
     doubts = array(_DOUBTS, np.int64, "doubts", worker)
     doubts[0] = 0
     scratch = Scratch(
@@ -305,12 +304,13 @@ def _desk(workspace: Workspace, kernels: ModuleType, worker: int) -> Desk:
     return Desk(scratch, doubts)
 
 
-def _view(raster: Raster, origin: np.ndarray, balls: np.ndarray) -> View:
+def _view(raster: Raster, origin: np.ndarray, balls: np.ndarray, material: np.ndarray) -> View:
     grid, (x, y, z) = eye_grid(raster), origin.tolist()
     across = np.concatenate([grid.across, np.full(8, grid.across[-1])])
+    up, a1, a0 = (np.append(rows, rows[-1]) for rows in (grid.up, grid.a1, grid.a0))
     return View(
-        across, grid.up, grid.a1, grid.a0, grid.a2, grid.u, grid.v, grid.back, grid.reach, usable_spread(raster),
-        (x, y, z), balls.reshape(-1),
+        across, up, a1, a0, grid.a2, grid.u, grid.v, grid.back, grid.reach, usable_spread(raster), (x, y, z),
+        balls.reshape(-1), material,
     )  # fmt: skip
 
 
@@ -318,8 +318,8 @@ def _sort(
     workspace: Workspace, kernels: ModuleType, lens: Lens, view: View, spheres: int, threads: int | None
 ) -> tuple[Bins, np.ndarray]:
     """The lists of all tiles; and the slow spheres, which are in none."""
-    columns, rows = -(-len(view.across) // kernels.TILE_WIDTH), -(-len(view.up) // kernels.TILE_HEIGHT)
     columns = -(-(len(view.across) - 8) // kernels.TILE_WIDTH)
+    rows = -(-(len(view.up) - 1) // kernels.TILE_HEIGHT)
     workers = 1 if spheres < _FEW else min(threads or cores(), _MOST_WORKERS)
     cuts = [spheres * worker // workers // 8 * 8 for worker in range(workers)] + [spheres]
     boxes = workspace.array(4 * (spheres + 8), np.int32, "boxes")
@@ -340,16 +340,15 @@ def _sort(
         slow += found
 
     def fill(part: int, worker: int) -> None:
-        kernels.fill(boxes, cuts[part], cuts[part + 1], counts[part], ids, corners, columns)
+        kernels.fill(boxes, cuts[part], cuts[part + 1], counts[part], entries, columns)
 
     share(list(range(workers)), bound, threads, add)
     kernels.begin(counts, starts)
-    ids = workspace.array(int(starts[-1]) + _SPARE, np.int32, "ids")
-    corners = workspace.array(len(ids), np.uint32, "corners")
-    ids[int(starts[-1]) :] = 0
+    entries = workspace.array(int(starts[-1]) + _SPARE, np.uint64, "entries")
+    entries[int(starts[-1]) :] = 0
     share(list(range(workers)), fill, threads)
     which = np.flatnonzero(boxes[: 4 * spheres : 4] < 0) if slow else np.empty(0, np.int64)
-    return Bins(boxes, starts, ids, corners, columns), which.astype(np.int32)
+    return Bins(boxes, starts, entries, columns), which.astype(np.int32)
 
 
 def _slow(

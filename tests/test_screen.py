@@ -111,7 +111,7 @@ def test_memory_is_forty_bytes_a_sphere_at_most():
     sizes = []
     for each in (few, scene):
         with open_screen(each, make_raster(each.camera, 64, 64), KERNELS) as opened:
-            arrays = [opened.bins.boxes, opened.bins.ids, opened.bins.corners, opened.slow.boxes]
+            arrays = [opened.bins.boxes, opened.bins.entries, opened.slow.boxes]
             sizes.append(sum(array.nbytes for array in arrays))
     assert (sizes[1] - sizes[0]) / (len(scene.spheres) - len(few.spheres)) <= 40
 

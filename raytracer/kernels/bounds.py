@@ -5,7 +5,7 @@
     boxes   left right top bottom | …  int32, flat; empty for what cannot be seen, left = −1 for a slow sphere
     counts  how many boxes reach into each tile, int64
       ↓ begin, fill
-    ids, corners   the list of each tile
+    entries   the list of each tile, see `Bins`
 
 A slow sphere is one that `certified.approach` is not for: around the eye or close to it, or reaching behind it.
 """
@@ -88,11 +88,8 @@ def begin(counts, starts):
 
 
 @borrowing
-def fill(boxes, first, last, places, ids, corners, columns):
-    """Put spheres first to last − 1 into the lists of their tiles; `places` is where each list goes on.
-
-    corners gets the part of the box that lies in the tile, in the tile's pixels, a byte a side.
-    """
+def fill(boxes, first, last, places, entries, columns):
+    """Put spheres first to last − 1 into the lists of their tiles; `places` is where each list goes on."""
     for i in range(np.uint64(first), np.uint64(last)):
         left, right, top, bottom = _box(boxes, i)
         if 0 <= left < right and top < bottom:
@@ -103,6 +100,6 @@ def fill(boxes, first, last, places, ids, corners, columns):
                     x = column << _WIDE
                     tile = np.uint64(row * columns + column)
                     place = np.uint64(places[tile])
-                    ids[place] = i
-                    corners[place] = max(left - x, 0) | min(right - x, TILE_WIDTH) << 8 | high << 16 | low << 24
+                    corners = max(left - x, 0) | min(right - x, TILE_WIDTH) << 8 | high << 16 | low << 24
+                    entries[place] = np.uint64(corners) << np.uint64(32) | i
                     places[tile] = place + np.uint64(1)

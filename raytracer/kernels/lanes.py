@@ -16,7 +16,7 @@ import operator
 import numpy as np
 from llvmlite import ir
 from numba.core import types
-from numba.core.cgutils import get_or_insert_function
+from numba.core.cgutils import get_or_insert_function, raw_memcpy
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import intrinsic, lower_builtin, lower_cast, models, register_model
 
@@ -268,6 +268,58 @@ def store(typing, array, i, value):
     return types.void(array, types.uint64, value), lower
 
 
+@intrinsic
+def load_low(typing, array, i):
+    """The low halves of eight uint64, from element i on, as places."""
+
+    def lower(context, builder, sig, args):
+        vector = ir.VectorType(ir.IntType(64), WIDTH)
+        wide = builder.load(_address(context, builder, sig.args[0], args[0], args[1], vector), align=8)
+        return builder.trunc(wide, ir.VectorType(_INT32, WIDTH))
+
+    return PLACES(array, types.uint64), lower
+
+
+@intrinsic
+def load_pair(typing, array, i, j):
+    """Four numbers of an array from element i on, and four from j on: lanes of float64, places of int32."""
+    kind = PLACES if array.dtype == types.int32 else LANES
+
+    def lower(context, builder, sig, args):
+        array, *starts = args
+        half = ir.VectorType(kind.element, WIDTH // 2)
+        addresses = [_address(context, builder, sig.args[0], array, start, half) for start in starts]
+        return _joined(builder, [builder.load(address, align=4) for address in addresses])
+
+    return kind(array, types.uint64, types.uint64), lower
+
+
+@intrinsic
+def store_pair(typing, array, i, j, value):
+    """Put four lanes or places into an array from element i on, and the other four from j on."""
+
+    def lower(context, builder, sig, args):
+        array, *starts, value = args
+        half = WIDTH // 2
+        for lane, start in zip((0, half), starts, strict=True):
+            part = builder.shuffle_vector(value, value, _order(range(lane, lane + half)))
+            builder.store(part, _address(context, builder, sig.args[0], array, start, part.type), align=4)
+        return context.get_dummy_value()
+
+    return types.void(array, types.uint64, types.uint64, value), lower
+
+
+@intrinsic
+def spread_pair(typing, a, b):
+    """One number in the first four lanes, another in the rest."""
+
+    def lower(context, builder, sig, args):
+        first, last = (_spread(builder, number) for number in args)
+        return builder.shuffle_vector(first, last, _order(range(WIDTH // 2, WIDTH + WIDTH // 2)))
+
+    return LANES(types.float64, types.float64), lower
+
+
 def _joined(builder, vectors):
     """Vectors one behind the other, as one."""
     while len(vectors) > 1:
@@ -277,10 +329,33 @@ def _joined(builder, vectors):
     return vectors[0]
 
 
-def _columns(context, builder, wide):
-    """Four lanes: the columns of eight rows of four numbers."""
-    columns = [builder.shuffle_vector(wide, wide, _order(range(k, _FOUR * WIDTH, _FOUR))) for k in range(_FOUR)]
+def _columns(context, builder, rows):
+    """Four lanes: the columns of eight rows of four numbers, by shuffles that cross the vector only once."""
+
+    def shuffle(a, b, *order):
+        return builder.shuffle_vector(a, b, _order(order))
+
+    near, far = (
+        (
+            shuffle(a, b, 0, 8, 2, 10, 4, 12, 6, 14),  # two of column 0, two of 2, two of 0, two of 2
+            shuffle(a, b, 1, 9, 3, 11, 5, 13, 7, 15),
+        )
+        for a, b in (
+            (_joined(builder, [rows[i], rows[i + 2]]), _joined(builder, [rows[i + 1], rows[i + 3]])) for i in (0, 4)
+        )
+    )
+    columns = [shuffle(a, b, 0, 1, 4, 5, 8, 9, 12, 13) for a, b in zip(near, far, strict=True)]
+    columns += [shuffle(a, b, 2, 3, 6, 7, 10, 11, 14, 15) for a, b in zip(near, far, strict=True)]
     return context.make_tuple(builder, types.UniTuple(LANES, _FOUR), columns)
+
+
+def _rows(context, builder, kind, table, places):
+    """The rows of a flat table of four columns at some places."""
+    row, rows = ir.VectorType(_DOUBLE, _FOUR), []
+    for place in places:
+        start = builder.mul(place, ir.Constant(place.type, _FOUR))
+        rows.append(builder.load(_address(context, builder, kind, table, start, row), align=8))
+    return rows
 
 
 @intrinsic
@@ -288,10 +363,9 @@ def load_rows(typing, table, i):
     """Eight rows of a flat table of four columns, from row i on, as four lanes."""
 
     def lower(context, builder, sig, args):
-        start = builder.mul(args[1], ir.Constant(args[1].type, _FOUR))
-        wide = ir.VectorType(_DOUBLE, _FOUR * WIDTH)
-        address = _address(context, builder, sig.args[0], args[0], start, wide)
-        return _columns(context, builder, builder.load(address, align=8))
+        table, i = args
+        places = [builder.add(i, ir.Constant(i.type, lane)) for lane in range(WIDTH)]
+        return _columns(context, builder, _rows(context, builder, sig.args[0], table, places))
 
     return types.UniTuple(LANES, _FOUR)(table, types.uint64), lower
 
@@ -301,12 +375,10 @@ def gather_rows(typing, table, places):
     """The rows of a flat table of four columns at eight places, as four lanes."""
 
     def lower(context, builder, sig, args):
-        row, rows = ir.VectorType(_DOUBLE, _FOUR), []
-        for lane in range(WIDTH):
-            place = builder.zext(builder.extract_element(args[1], ir.Constant(_INT32, lane)), ir.IntType(64))
-            start = builder.mul(place, ir.Constant(place.type, _FOUR))
-            rows.append(builder.load(_address(context, builder, sig.args[0], args[0], start, row), align=8))
-        return _columns(context, builder, _joined(builder, rows))
+        table, lanes = args
+        which = [builder.extract_element(lanes, ir.Constant(_INT32, lane)) for lane in range(WIDTH)]
+        places = [builder.zext(place, ir.IntType(64)) for place in which]
+        return _columns(context, builder, _rows(context, builder, sig.args[0], table, places))
 
     return types.UniTuple(LANES, _FOUR)(table, places), lower
 
@@ -388,3 +460,16 @@ def put_pixels(typing, picture, start, step, red, green, blue):
         return context.get_dummy_value()
 
     return types.void(picture, types.uint64, types.uint64, LANES, LANES, LANES), lower
+
+
+@intrinsic
+def copy_bytes(typing, array, start, end, to):
+    """Copy the bytes from `start` to `end`, excluded, of a flat array to where they do not overlap."""
+
+    def lower(context, builder, sig, args):
+        array, start, end, to = args
+        data = context.make_array(sig.args[0])(context, builder, array).data
+        raw_memcpy(builder, builder.gep(data, [to]), builder.gep(data, [start]), builder.sub(end, start), 1)
+        return context.get_dummy_value()
+
+    return types.void(array, types.uint64, types.uint64, types.uint64), lower

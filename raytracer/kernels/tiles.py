@@ -49,7 +49,7 @@ def _paint(view, slow, bins, first, last, scratch, doubts, paints, out):
 @inlined
 def _tile(view, bins, number):
     left, top = number % bins.columns * TILE_WIDTH, number // bins.columns * TILE_HEIGHT
-    width, height = len(view.across) - WIDTH, len(view.up)
+    width, height = len(view.across) - WIDTH, len(view.up) - 1
     return Tile(number, left, top, min(left + TILE_WIDTH, width), min(top + TILE_HEIGHT, height))
 
 
@@ -102,25 +102,25 @@ def _shaded_tile(view, scratch, tile, paints, out):
                 continue
             where = select(hit, index, spread(largest_of(index)))
             p, n, radius = _surface(view, line, load(scratch.k, place), x, where)
-            red, green, blue = shade(paints, p, n, radius, where)
+            red, green, blue = shade(view, paints, p, n, radius, where)
             red, green, blue = _over(paints, hit, red, green, blue)
             put_lanes(out, row, x, tile.right, red, green, blue, scratch)
 
 
 @inlined
-def _diffuse(paints, p, n, radius, where):
+def _diffuse(view, paints, p, n, radius, where):
     """`stages.diffuse`."""
     red, green, blue, light = spread(0.0), spread(0.0), spread(0.0), paints.lights
     for i in range(np.uint64(len(light))):
         facing, square = towards(p, n, (light[i, 0], light[i, 1], light[i, 2]))
         shine = cosine(facing, square, radius)
         red, green, blue = red + light[i, 3] * shine, green + light[i, 4] * shine, blue + light[i, 5] * shine
-    r, g, b, _ = _colours(paints, where)
+    r, g, b, _ = _colours(view, paints, where)
     return to_byte(red * r), to_byte(green * g), to_byte(blue * b)
 
 
 @inlined
-def _normal(paints, p, n, radius, where):
+def _normal(view, paints, p, n, radius, where):
     """`stages.normal`."""
     red, green, blue = (n[0] / radius + 1.0) / 2.0, (n[1] / radius + 1.0) / 2.0, (n[2] / radius + 1.0) / 2.0
     return to_byte(red), to_byte(green), to_byte(blue)
@@ -161,12 +161,12 @@ def _ball(view, where):
 
 
 @inlined
-def _colours(paints, where):
+def _colours(view, paints, where):
     """The diffuse colours of the spheres at these places."""
     if same(where):
-        i, colours = np.uint64(4) * np.uint64(paints.material[np.uint64(first_of(where))]), paints.colours
+        i, colours = np.uint64(4) * np.uint64(view.material[np.uint64(first_of(where))]), paints.colours
         return spread(colours[i]), spread(colours[i + np.uint64(1)]), spread(colours[i + np.uint64(2)]), spread(0.0)
-    return gather_rows(paints.colours, gather(paints.material, where))
+    return gather_rows(paints.colours, gather(view.material, where))
 
 
 @inlined

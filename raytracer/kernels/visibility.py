@@ -4,10 +4,12 @@
     │      ┌ box ┐        │        index   which sphere that is
     │      │▒▒▒▒▒│        │        doubt   whether float64 cannot tell
     │      │▒▒▒▒▒│        │
-    │      └─────┘        │        rows of TILE_WIDTH pixels, and 8 to spare: a box's last eight may reach beyond
+    │      └─────┘        │        rows of TILE_WIDTH pixels, and 8 to spare, and a row to spare:
+                                   what is drawn of a box is whole vectors, and may reach beyond
     └─────────────────────┘
 
 A box has no mask: beyond it the sphere is not hit. What the spheres of eight list entries need is computed at once.
+A vector holds eight pixels of a row, or four of one and four of the next: of boxes that are no wider.
 """
 
 import numpy as np
@@ -15,15 +17,30 @@ import numpy as np
 from raytracer.certified import K_ERROR, approach, arrive, edge_of, inner, meet, side_of
 from raytracer.kernels.bounds import TILE_HEIGHT, TILE_WIDTH
 from raytracer.kernels.compiler import borrowing, compiled, inlined, variant
-from raytracer.kernels.lanes import WIDTH, any_of, bits_of, blend, fetch_ahead, gather_rows, load, spread, store
+from raytracer.kernels.lanes import (
+    WIDTH,
+    any_of,
+    bits_of,
+    blend,
+    fetch_ahead,
+    gather_rows,
+    load,
+    load_low,
+    load_pair,
+    spread,
+    spread_pair,
+    store,
+    store_pair,
+)
 
 STRIDE = TILE_WIDTH + WIDTH
+_HALF, _NEXT_ROW = np.uint64(WIDTH // 2), np.uint64(STRIDE)
 _AHEAD = 24  # list entries: how long before it is wanted a sphere is fetched
 
 
 def _see(view, slow, bins, tile, scratch):
     """Fill the depth buffer of a tile; returns whether there are doubts."""
-    for p in range(np.uint64(0), np.uint64(TILE_HEIGHT * STRIDE), np.uint64(WIDTH)):
+    for p in range(np.uint64(0), np.uint64((TILE_HEIGHT + 1) * STRIDE), np.uint64(WIDTH)):
         store(scratch.k, p, spread(np.inf))
         store(scratch.index, p, spread(np.int32(-1)))
     doubts = False
@@ -33,7 +50,7 @@ def _see(view, slow, bins, tile, scratch):
     for first in range(bins.starts[tile.number], end, WIDTH):
         _look_at_eight(view, bins, first, scratch)
         for j in range(np.uint64(0), np.uint64(min(WIDTH, end - first))):
-            doubts |= _draw(draw_row, view, bins, np.uint64(first) + j, j, tile, scratch)
+            doubts |= _draw(draw_row, draw_pair, view, bins, np.uint64(first) + j, j, tile, scratch)
     return doubts
 
 
@@ -41,7 +58,7 @@ def _see(view, slow, bins, tile, scratch):
 def _look_at_eight(view, bins, first, scratch):
     """What the next eight spheres of a list have in common with all rows: h is across·hu + up·hv + hw; c and edge."""
     u, v, back, batch = view.u, view.v, view.back, scratch.batch
-    x, y, z, radius = gather_rows(view.balls, load(bins.ids, first))
+    x, y, z, radius = gather_rows(view.balls, load_low(bins.entries, first))
     lx, ly, lz = view.eye[0] - x, view.eye[1] - y, view.eye[2] - z
     c, square = side_of(lx, ly, lz, radius)
     store(batch, 0, inner(u[0], u[1], u[2], lx, ly, lz))
@@ -52,26 +69,52 @@ def _look_at_eight(view, bins, first, scratch):
 
 
 @inlined
-def _draw(draw_row, view, bins, place, j, tile, scratch):
+def _draw(draw_row, draw_pair, view, bins, place, j, tile, scratch):
     """Draw the sphere at a place of the list, number j of the eight that were looked at."""
-    fetch_ahead(view.balls, np.uint64(4) * np.uint64(bins.ids[place + np.uint64(_AHEAD)]))
-    i, corners, batch = bins.ids[place], bins.corners[place], scratch.batch
-    start, stop, high, low = corners & 255, corners >> 8 & 255, corners >> 16 & 255, corners >> 24
+    _fetch(view, _sphere(bins.entries[place + np.uint64(_AHEAD)]))
+    entry, batch = bins.entries[place], scratch.batch
+    i, (start, stop, high, low) = np.int32(_sphere(entry)), _corners(entry)
     hu, hv, hw = batch[j], batch[j + np.uint64(8)], batch[j + np.uint64(16)]
     c, edge = batch[j + np.uint64(24)], batch[j + np.uint64(32)]
-    doubts = False
-    for line in range(high, low):
-        hr = view.up[np.uint64(tile.top + line)] * hv + hw
-        doubts |= draw_row(view, i, line, tile, start, stop, hu, hr, c, edge, scratch)
+    doubts, line, x, p = False, high, np.uint64(tile.left + start), np.uint64(high * STRIDE + start)
+    while line < low:
+        row = np.uint64(tile.top + line)
+        hr = view.up[row] * hv + hw
+        if stop - start <= WIDTH // 2:
+            doubts |= draw_pair(view, i, row, x, p, hu, hr, view.up[row + np.uint64(1)] * hv + hw, c, edge, scratch)
+            line, p = line + 2, p + _NEXT_ROW + _NEXT_ROW
+        else:
+            doubts |= draw_row(view, i, row, x, p, p + np.uint64(stop - start), hu, hr, c, edge, scratch)
+            line, p = line + 1, p + _NEXT_ROW
     return doubts
 
 
-def _draw_row(view, i, line, tile, start, stop, hu, hr, c, edge, scratch):
-    """Returns whether there are doubts."""
-    row, doubts = np.uint64(tile.top + line), False
-    a2, a1, a0 = view.a2, view.a1[row], view.a0[row]
-    x, end, p = np.uint64(tile.left + start), np.uint64(tile.left + stop), np.uint64(line * STRIDE + start)
-    while x < end:
+@inlined
+def _fetch(view, sphere):
+    """A sphere will be wanted soon: to be drawn, and then to be painted."""
+    fetch_ahead(view.balls, np.uint64(4) * sphere)
+    fetch_ahead(view.material, sphere)
+
+
+@inlined
+def _sphere(entry):
+    return entry & np.uint64(0xFFFFFFFF)
+
+
+@inlined
+def _corners(entry):
+    """Left, right, top, bottom of an entry's box within the tile."""
+    corners = np.int64(entry >> np.uint64(32))
+    return corners & 255, corners >> 8 & 255, corners >> 16 & 255, corners >> 24
+
+
+def _draw_row(view, i, row, x, p, end, hu, hr, c, edge, scratch):
+    """A row of a box, which begins with column x of the picture and is from p to `end` in the buffer.
+
+    Returns whether there are doubts.
+    """
+    doubts, a2, a1, a0 = False, view.a2, view.a1[row], view.a0[row]
+    while p < end:
         across, best = load(view.across, x), load(scratch.k, p)
         a = (across * a2 + a1) * across + a0
         k, wins, doubt = approach(across * hu + hr, a, c, edge, best)
@@ -81,6 +124,23 @@ def _draw_row(view, i, line, tile, start, stop, hu, hr, c, edge, scratch):
             doubts = True
         x += np.uint64(WIDTH)
         p += np.uint64(WIDTH)
+    return doubts
+
+
+def _draw_pair(view, i, row, x, p, hu, hr, next_hr, c, edge, scratch):
+    """Four pixels of a row and the four below them."""
+    below, next_row, doubts = p + _NEXT_ROW, row + np.uint64(1), False
+    across, best = load_pair(view.across, x, x), load_pair(scratch.k, p, below)
+    a1, a0 = spread_pair(view.a1[row], view.a1[next_row]), spread_pair(view.a0[row], view.a0[next_row])
+    a = (across * view.a2 + a1) * across + a0
+    k, wins, doubt = approach(across * hu + spread_pair(hr, next_hr), a, c, edge, best)
+    store_pair(scratch.k, p, below, blend(wins, k, best))
+    store_pair(scratch.index, p, below, blend(wins, spread(i), load_pair(scratch.index, p, below)))
+    if certain and any_of(doubt):
+        bits = bits_of(doubt)
+        _note(scratch.doubt, p, bits & 15)
+        _note(scratch.doubt, below, bits >> 4)
+        doubts = True
     return doubts
 
 
@@ -137,8 +197,10 @@ def list_doubts(view, tile, scratch, doubts):
 
 _certain_row = variant(_draw_row, "_certain_row", inlined, certain=True)
 _unchecked_row = variant(_draw_row, "_unchecked_row", inlined, certain=False)  # to measure what certainty costs
-see_tile = variant(_see, "see_tile", draw_row=_certain_row)
-see_tile_unchecked = variant(_see, "see_tile_unchecked", draw_row=_unchecked_row)
+_certain_pair = variant(_draw_pair, "_certain_pair", inlined, certain=True)
+_unchecked_pair = variant(_draw_pair, "_unchecked_pair", inlined, certain=False)
+see_tile = variant(_see, "see_tile", draw_row=_certain_row, draw_pair=_certain_pair)
+see_tile_unchecked = variant(_see, "see_tile_unchecked", draw_row=_unchecked_row, draw_pair=_unchecked_pair)
 
 
 @compiled
@@ -159,21 +221,21 @@ def _merge(slow, bins, x, y, ids, at):
     tile, found, next_slow = y // TILE_HEIGHT * bins.columns + x // TILE_WIDTH, 0, 0
     for place in range(bins.starts[tile], bins.starts[tile + 1] + 1):
         last = place == bins.starts[tile + 1]
-        while next_slow < len(slow.ids) and (last or slow.ids[next_slow] < bins.ids[place]):
+        while next_slow < len(slow.ids) and (last or slow.ids[next_slow] < _sphere(bins.entries[place])):
             box = slow.boxes[next_slow]
             if box[0] <= x and x < box[1] and box[2] <= y and y < box[3]:
                 if len(ids):
                     ids[at + found] = slow.ids[next_slow]
                 found += 1
             next_slow += 1
-        if not last and _holds(bins.corners[place], x % TILE_WIDTH, y % TILE_HEIGHT):
+        if not last and _holds(bins.entries[place], x % TILE_WIDTH, y % TILE_HEIGHT):
             if len(ids):
-                ids[at + found] = bins.ids[place]
+                ids[at + found] = _sphere(bins.entries[place])
             found += 1
     return found
 
 
 @inlined
-def _holds(corners, x, y):
-    left, right, top, bottom = corners & 255, corners >> 8 & 255, corners >> 16 & 255, corners >> 24
+def _holds(entry, x, y):
+    left, right, top, bottom = _corners(entry)
     return left <= x and x < right and top <= y and y < bottom
