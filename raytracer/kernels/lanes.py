@@ -16,7 +16,7 @@ import operator
 import numpy as np
 from llvmlite import ir
 from numba.core import types
-from numba.core.cgutils import get_or_insert_function, raw_memcpy
+from numba.core.cgutils import get_or_insert_function
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import intrinsic, lower_builtin, lower_cast, models, register_model
 
@@ -460,16 +460,3 @@ def put_pixels(typing, picture, start, step, red, green, blue):
         return context.get_dummy_value()
 
     return types.void(picture, types.uint64, types.uint64, LANES, LANES, LANES), lower
-
-
-@intrinsic
-def copy_bytes(typing, array, start, end, to):
-    """Copy the bytes from `start` to `end`, excluded, of a flat array to where they do not overlap."""
-
-    def lower(context, builder, sig, args):
-        array, start, end, to = args
-        data = context.make_array(sig.args[0])(context, builder, array).data
-        raw_memcpy(builder, builder.gep(data, [to]), builder.gep(data, [start]), builder.sub(end, start), 1)
-        return context.get_dummy_value()
-
-    return types.void(array, types.uint64, types.uint64, types.uint64), lower

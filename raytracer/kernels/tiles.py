@@ -67,30 +67,34 @@ def put_lanes(out, row, x, right, red, green, blue, scratch):
 
 
 @inlined
-def _put_background(out, row, x, right, paints, scratch):
-    red, green, blue = paints.background[0], paints.background[1], paints.background[2]
-    put_lanes(out, row, x, right, spread(red), spread(green), spread(blue), scratch)
+def _background(paints):
+    """Taken out of the loops by hand: for all the compiler knows, to paint changes it."""
+    return spread(paints.background[0]), spread(paints.background[1]), spread(paints.background[2])
 
 
 @borrowing
 def _fill_tile(scratch, tile, paints, out):
     """The background."""
+    red, green, blue = _background(paints)
     for row in range(tile.top, tile.bottom):
         for x in range(tile.left, tile.right, WIDTH):
-            _put_background(out, row, x, tile.right, paints, scratch)
+            put_lanes(out, row, x, tile.right, red, green, blue, scratch)
 
 
 @borrowing
 def _flat_tile(view, scratch, tile, paints, out):
     """One colour wherever anything is hit."""
+    background, flat = _background(paints), paints.flat
+    colour = spread(flat[0]), spread(flat[1]), spread(flat[2])
     for row in range(tile.top, tile.bottom):
         for x in range(tile.left, tile.right, WIDTH):
             hit = is_hit(load(scratch.index, _place(tile, row, x)))
-            red, green, blue = _over(paints, hit, paints.flat[0], paints.flat[1], paints.flat[2])
+            red, green, blue = _over(background, hit, *colour)
             put_lanes(out, row, x, tile.right, red, green, blue, scratch)
 
 
 def _shaded_tile(view, scratch, tile, paints, out):
+    background = _background(paints)
     for row in range(tile.top, tile.bottom):
         line = _line(view, row)
         for x in range(tile.left, tile.right, WIDTH):
@@ -98,12 +102,12 @@ def _shaded_tile(view, scratch, tile, paints, out):
             index = load(scratch.index, place)
             hit = is_hit(index)
             if not any_of(hit):
-                _put_background(out, row, x, tile.right, paints, scratch)
+                put_lanes(out, row, x, tile.right, *background, scratch)
                 continue
             where = select(hit, index, spread(largest_of(index)))
             p, n, radius = _surface(view, line, load(scratch.k, place), x, where)
             red, green, blue = shade(view, paints, p, n, radius, where)
-            red, green, blue = _over(paints, hit, red, green, blue)
+            red, green, blue = _over(background, hit, red, green, blue)
             put_lanes(out, row, x, tile.right, red, green, blue, scratch)
 
 
@@ -170,14 +174,22 @@ def _colours(view, paints, where):
 
 
 @inlined
-def _over(paints, hit, red, green, blue):
+def _over(background, hit, red, green, blue):
     """The background where nothing is hit."""
-    background = paints.background
-    return (
-        select(hit, red, spread(background[0])),
-        select(hit, green, spread(background[1])),
-        select(hit, blue, spread(background[2])),
-    )
+    return select(hit, red, background[0]), select(hit, green, background[1]), select(hit, blue, background[2])
+
+
+@inlined
+def _put_hits(out, at, room, t, place, scratch):
+    """Eight hits, or as many as there is room for."""
+    if room >= WIDTH:
+        store(out.t, at, t)
+        store(out.index, at, load(scratch.index, place))
+    else:
+        store(scratch.batch, 0, t)
+        for pixel in range(np.uint64(room)):
+            out.t[at + pixel] = scratch.batch[pixel]
+            out.index[at + pixel] = scratch.index[place + pixel]
 
 
 @borrowing
@@ -191,14 +203,7 @@ def _hits_tile(view, scratch, tile, paints, out):
             index = load(scratch.index, place)
             t = load(scratch.k, place) / ((across * view.a2 + a1) * across + a0)
             t = select(is_hit(index), t, np.inf)
-            if x + WIDTH <= tile.right:
-                store(out.t, at, t)
-                store(out.index, at, index)
-            else:
-                store(scratch.batch, 0, t)
-                for pixel in range(np.uint64(tile.right - x)):
-                    out.t[at + pixel] = scratch.batch[pixel]
-                    out.index[at + pixel] = scratch.index[place + pixel]
+            _put_hits(out, at, tile.right - x, t, place, scratch)
 
 
 @borrowing
@@ -210,24 +215,18 @@ def _fine_hits_tile(view, scratch, tile, fine, out):
         for x in range(tile.left, tile.right, WIDTH):
             across, place, at = load(view.across, x), _place(tile, row, x), start + np.uint64(x)
             index, low, u, eye = load(scratch.index, place), load(fine.across_low, x), view.u, view.eye
-            t = load(scratch.k, place) / ((across * view.a2 + a1) * across + a0)
             hit = is_hit(index)
-            if any_of(hit):
-                cx, cy, cz, radius = _ball(view, select(hit, index, spread(largest_of(index))))
-                dx = fine_direction(across, low, u[0], fine.x[r], fine.x_low[r])
-                dy = fine_direction(across, low, u[1], fine.y[r], fine.y_low[r])
-                dz = fine_direction(across, low, u[2], fine.z[r], fine.z_low[r])
-                finer, sure = refine(t, dx, dy, dz, eye[0], eye[1], eye[2], cx, cy, cz, radius)
-                t = select(sure, finer, np.nan)
-            t = select(hit, t, np.inf)
-            if x + WIDTH <= tile.right:
-                store(out.t, at, t)
-                store(out.index, at, index)
-            else:
-                store(scratch.batch, 0, t)
-                for pixel in range(np.uint64(tile.right - x)):
-                    out.t[at + pixel] = scratch.batch[pixel]
-                    out.index[at + pixel] = scratch.index[place + pixel]
+            if not any_of(hit):
+                _put_hits(out, at, tile.right - x, spread(np.inf), place, scratch)
+                continue
+            t = load(scratch.k, place) / ((across * view.a2 + a1) * across + a0)
+            cx, cy, cz, radius = _ball(view, select(hit, index, spread(largest_of(index))))
+            dx = fine_direction(across, low, u[0], fine.x[r], fine.x_low[r])
+            dy = fine_direction(across, low, u[1], fine.y[r], fine.y_low[r])
+            dz = fine_direction(across, low, u[2], fine.z[r], fine.z_low[r])
+            finer, sure = refine(t, dx, dy, dz, eye[0], eye[1], eye[2], cx, cy, cz, radius)
+            t = select(hit, select(sure, finer, np.nan), np.inf)
+            _put_hits(out, at, tile.right - x, t, place, scratch)
 
 
 @borrowing
