@@ -88,6 +88,11 @@ class Candidates(NamedTuple):
         """The number of the ray for each id of these rays, in order, counted from 0."""
         return np.repeat(np.arange(len(which)), np.diff(self.starts)[which])
 
+    def only(self, these: np.ndarray) -> Candidates:
+        """Some of the candidates, bool (ids,), of all rays."""
+        counts = np.concatenate([[0], np.cumsum(these)])
+        return Candidates(counts[self.starts], self.ids[these])
+
     def of(self, which: np.ndarray) -> Candidates:
         """The candidates of some of the rays."""
         counts = np.diff(self.starts)[which]
@@ -123,6 +128,15 @@ class Seen(NamedTuple):
     size: np.ndarray  # √(L·L + r²)
     radius: np.ndarray
     edge: np.ndarray  # see `certified.edge_of`; 0 if `certified.approach` is not for this sphere
+
+
+class Facets(NamedTuple):
+    """Triangles as seen from one origin: see `facets`. A ray D = across·u + up·v − back."""
+
+    rows: np.ndarray  # (n, 12): e₁, e₂, e₃ and n·D, what each is of across, of up, and besides
+    distance: np.ndarray  # (n,), n·a in the unit in which the rows have n·D; 0 where nothing is known
+    planes: np.ndarray  # (n, 4): the unit normal that faces the origin, and the corners' product with it
+    faces: np.ndarray  # bool (n,): whether the origin is beside the plane
 
 
 class Balls(NamedTuple):
@@ -172,6 +186,9 @@ class Tree(NamedTuple):
 # ------------------------------------------------------------------------------------ what `raytracer.screen` shares
 
 
+FACET = 16  # numbers a triangle, of which some are to spare
+
+
 class View(NamedTuple):
     """A picture's rays and its spheres, for the kernels; beyond its columns are eight to spare, beyond its rows is one."""
 
@@ -186,8 +203,10 @@ class View(NamedTuple):
     reach: float
     kappa: float  # see `plain.see`
     eye: tuple[float, float, float]
-    balls: np.ndarray  # float64, flat: x, y, z, radius of each sphere
-    material: np.ndarray  # int32: of each sphere, a row of `Paints.colours`
+    balls: np.ndarray  # float64, flat: x, y, z, radius of each sphere, then `Facets.planes`
+    material: np.ndarray  # int32: of each of those rows, a row of `Paints.colours`
+    facets: np.ndarray  # float64, flat: FACET numbers a triangle, `Facets.rows` and `distance`
+    first_facet: int  # the number of the first triangle
 
 
 class Slow(NamedTuple):
@@ -208,6 +227,7 @@ class Bins(NamedTuple):
     boxes: np.ndarray  # int32, flat: left, right, top, bottom of each sphere of the scene
     starts: np.ndarray  # int64 (tiles + 1,)
     entries: np.ndarray  # uint64: the list of tile i is entries[starts[i] : starts[i + 1]]; some more to spare
+    middles: np.ndarray  # int64 (tiles,), where in its list the triangles begin
     columns: int  # tiles side by side
 
 

@@ -28,6 +28,7 @@ from raytracer.twofold import Number, select
 
 _PAD_HALF, _PAD = 1e-6, 1e-9  # added to the ellipse's half width, relative; to its middle, relative and absolute
 _CROSSES = 1e-6  # K₃₃ / z² below this, for a frame that magnifies nothing: the ellipse opens up
+_SHALLOW = 1e-6  # a corner's depth, of its distance, below which its place on the screen is not worked out
 _FARTHEST_APART = 1000  # powers of two between the lengths of the rows n
 
 Row = tuple[float, float, float]
@@ -136,6 +137,30 @@ def box_of(lens: Lens, qx: Number, qy: Number, qz: Number, radius: Number) -> Bo
     top, bottom = _pixels(-high_y, -low_y, lens.height, lens.height - lens.shift, lens.height)
     known = (k33 > lens.crosses * (zz + r2zz)) & (right >= 0.0) & (bottom >= 0.0)
     return Box(left, right, top, bottom, known, z)
+
+
+def facet_boxes(lens: Lens, a: np.ndarray) -> np.ndarray:
+    """The boxes of pixels that may see triangles, a = corner − eye (n, 3, 3): int32 (n, 4), as for spheres.
+
+    That of a triangle which reaches behind the eye is the whole picture; of one that is all behind it, empty.
+    """
+    x, y, z = (inner(*row, a[..., 0], a[..., 1], a[..., 2]) for row in (lens.nx, lens.ny, lens.nz))
+    sizes = [hypot(*row) for row in (lens.nx, lens.ny, lens.nz)]
+    length = np.sqrt(inner(*np.moveaxis(a, -1, 0), *np.moveaxis(a, -1, 0)))
+    depth = sizes[2] * length * _SHALLOW
+    front, hidden = (z > depth).all(axis=1), (z < -depth).all(axis=1)
+    sides: list[np.ndarray] = []
+    for part, size, scale, least, total in (
+        (x, sizes[0], lens.scale_x, lens.width - lens.shift, lens.width),
+        (-y, sizes[1], lens.scale_y, lens.height - lens.shift, lens.height),
+    ):
+        middle, error = scale * (part / z), _PAD + scale * (_PAD * size * length / abs(z))
+        error = error + _PAD * abs(middle) * (sizes[2] * length / abs(z))
+        sides += _pixels((middle - error).min(axis=1), (middle + error).max(axis=1), lens.height, least, total)
+    known = front & np.isfinite(sides).all(axis=0) & np.isfinite(lens.crosses)
+    whole = np.array([0, lens.width, 0, lens.height])
+    boxes = np.where(known[:, None], np.stack(sides, axis=-1), np.where(hidden[:, None], 0.0, whole))
+    return boxes.astype(np.int32)
 
 
 def _range(

@@ -31,6 +31,11 @@ with an error of 12u·m·l from h and the roundings, and of 48u·(m·l)² / (rim
 together (24u + 96u/rim)·κ·l²/c·k at most, below 2⁻²⁶·k while κ ≤ 64. A disc below −(rim·m·l)² is a miss, with much to
 spare. Between the two, and where two k differ by less than 2⁻²⁴ of themselves, the next level decides.
 
+**Triangles** (`approach_facet`, see `facets`). aᵢ and the edges are rounded once, so a component of a cross product is
+off by 4u of its two terms' sizes, the whole of it by less than 6u·|a||edge|, and eᵢ, a sum like h above, by less than
+32u·m·|a||edge|; likewise n·D by 32u·m·|edge||edge|, and n·a by 16u. Where both are above 2⁻²¹ of their largest values,
+t's error is below 2⁻²⁷ + 2⁻²⁸, and k's below 2⁻²⁶.
+
 **In two-fold arithmetic** the same sums hold with u² = 2⁻¹⁰⁶ for u and constants from `twofold`: D within 16u²·m, a dot
 product 13u², so h and a within 64u² = 2⁻¹⁰⁰ of m·l and m²; c within 16u²·l²; disc within 256u² = 2⁻⁹⁸ of (m·l)².
 """
@@ -79,6 +84,10 @@ LARGEST_SPREAD = 64.0
 NEAREST = 64.0
 RIM = 96.0 * 2.0**-26
 TIE = 4.0 * K_ERROR
+
+# For `approach_facet`, of the largest value each: the error of eᵢ and n·D; and how small n·D and n·a may be.
+FACET_ERROR = 2.0**-48
+STEEP = 2.0**-21
 
 # A hit's t is good enough to be shaded when its bound is less than this part of the radius, and of itself. Beyond that
 # lies a rim of a sphere's picture, which must stay narrow: what is in it goes on to the next level.
@@ -276,6 +285,21 @@ def approach(h: Number, a: Number, c: Number, edge: Number, best: Number) -> Thr
     disc = h * h - a * c
     k = -h - np.sqrt(disc)  # not a number for a miss
     return k, k < best, (abs(disc) <= edge) | (abs(k - best) <= TIE * k)
+
+
+def beside_edges(first: Number, second: Number, third: Number) -> tuple[Number, Number]:
+    """The smallest of eᵢ, and whether a ray certainly passes beside the triangle."""
+    low = select(first < second, first, second)
+    low = select(third < low, third, low)
+    return low, low < -FACET_ERROR
+
+
+def approach_facet(low: Number, slope: Number, distance: Number, a: Number, best: Number) -> Three:
+    """`approach` for a triangle: the smallest of eᵢ, n·D and n·a, each of its largest value and with V's sign."""
+    k = a * (distance / slope)
+    inside = low >= -FACET_ERROR
+    unsure = (low <= FACET_ERROR) | (slope <= STEEP) | (abs(k - best) <= TIE * k)
+    return k, inside & (k < best), inside & unsure
 
 
 def arrive(t: Number, low: Number, a: Number, best: Number) -> Three:

@@ -7,6 +7,11 @@ their numbers are integers. Then
     the roots are (−D·L ± √Δ) / D·D  with Δ = r² · D·D − |D × L|²
 
 where L = origin − centre. Signs of integers are certain, and two roots are put in order by squaring.
+
+With a, b, c from the origin to the corners of a triangle and V = a·(b × c), not 0, D = Σ eᵢ · corner / V for e₁ =
+D·(b × c), e₂ = D·(c × a), e₃ = D·(a × b) (Cramer); so the ray meets the triangle, its edges included, if and only if
+all of them have V's sign or are 0, and that at t = V / (e₁ + e₂ + e₃). A ray within the triangle's plane, V = 0, meets
+nothing.
 """
 
 from __future__ import annotations
@@ -14,12 +19,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from decimal import MAX_EMAX, MIN_EMIN, Decimal, localcontext
 from fractions import Fraction
+from itertools import repeat
 from math import frexp, inf, isqrt, lcm, ldexp, trunc
 from typing import NamedTuple
 
 Exact = float | Fraction  # a finite float64 stands for itself, exactly
 
-Surd = tuple[int, int, int]  # base + sign · √radicand, all of them integers
+Surd = tuple[int, int, int, int]  # (base + sign · √radicand) / divisor, all of them integers, divisor above 0
 
 _MANTISSA = 53  # a float64's bits
 _BITS = 128  # of a square root, to begin with: enough for a float64 even if 60 of them cancel
@@ -36,11 +42,11 @@ class Root(NamedTuple):
 
     def is_nearer(self, other: Root) -> bool:
         """Whether this root comes before another of the same ray."""
-        return _is_less(self[:3], other[:3])
+        return _is_less((*self[:3], 1), (*other[:3], 1))
 
     def nearest_float(self) -> float:
         """The float64 nearest to the root: +inf beyond the largest."""
-        return _nearest_float(self[:3], self.over, self.under)
+        return _nearest_float((*self[:3], 1), self.over, self.under)
 
     def decimal(self, digits: int) -> Decimal:
         """The root, to so many digits: off by less than one in the last."""
@@ -96,17 +102,23 @@ def nearest_hit(
     return nearest_of(_flat(origin, spheres), direction, unit)
 
 
-def nearest_of(lengths: list[Exact], direction: Sequence[Exact], unit: int = 1) -> tuple[float, int]:
-    """`nearest_hit`, its lengths in one list: the origin, then centre and radius of each sphere."""
+def nearest_of(
+    lengths: list[Exact], direction: Sequence[Exact], unit: int = 1, sizes: Sequence[int] | None = None
+) -> tuple[float, int]:
+    """`nearest_hit`, its lengths in one list: the origin, then centre and radius of each sphere.
+
+    Or shapes of both kinds: `sizes` says of each how many numbers it has, 4 for a sphere, 9 for a triangle's corners.
+    """
     whole, length_unit = _integers(lengths)
     steps, step_unit = _integers(direction)
     eye, a = whole[:3], _square(steps)
-    best = None
-    for k in range(3, len(whole), 4):
-        found = _hit(eye, steps, a, whole[k : k + 4])
+    best, k = None, 3
+    for i, size in enumerate(sizes if sizes is not None else repeat(4, len(whole) // 4)):
+        found = (_hit if size == 4 else _hit_triangle)(eye, steps, a, whole[k : k + size])
+        k += size
         if found is not None and (best is None or _is_less(found, best)):
-            best, at = found, k
-    return (inf, -1) if best is None else (_nearest_float(best, step_unit * unit, a * length_unit), at // 4)
+            best, at = found, i
+    return (inf, -1) if best is None else (_nearest_float(best, step_unit * unit, a * length_unit), at)
 
 
 def hits(
@@ -118,7 +130,7 @@ def hits(
     eye, a = whole[:3], _square(steps)
     over, under = step_unit * unit, a * length_unit
     found = [_hit(eye, steps, a, whole[k : k + 4]) for k in range(3, len(whole), 4)]
-    return [None if surd is None else Root(*surd, over, under) for surd in found]
+    return [None if surd is None else Root(*surd[:3], over, under) for surd in found]
 
 
 def _flat(origin: Sequence[Exact], spheres: Iterable[tuple[Sequence[Exact], Exact]]) -> list[Exact]:
@@ -134,6 +146,13 @@ def side(origin: Sequence[Exact], centre: Sequence[Exact], radius: Exact) -> Fra
     return sum((x * x for x in distances), Fraction(0)) - Fraction(radius) ** 2
 
 
+def volume(origin: Sequence[Exact], corners: Sequence[Sequence[Exact]]) -> Fraction:
+    """V = a·(b × c): 0 if the origin lies in the triangle's plane."""
+    a, b, c = ([Fraction(x) - Fraction(o) for x, o in zip(corner, origin, strict=True)] for corner in corners)
+    x, y, z = b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]
+    return a[0] * x + a[1] * y + a[2] * z
+
+
 def _hit(eye: list[int], steps: list[int], a: int, sphere: list[int]) -> Surd | None:
     """The smallest root above 0, but for the factor that all roots of the ray share."""
     middle, radicand = _reduced(eye, steps, a, sphere)
@@ -141,12 +160,29 @@ def _hit(eye: list[int], steps: list[int], a: int, sphere: list[int]) -> Surd | 
         return None
     square = middle * middle
     if square < radicand:
-        return middle, 1, radicand
+        return middle, 1, radicand, 1
     if middle <= 0:
         return None
     if square > radicand:
-        return middle, -1, radicand
-    return 2 * middle, 1, 0  # the origin is on the sphere: one root is 0, and the other has no square root left
+        return middle, -1, radicand, 1
+    return 2 * middle, 1, 0, 1  # the origin is on the sphere: one root is 0, and the other has no square root left
+
+
+def _hit_triangle(eye: list[int], steps: list[int], a: int, corners: list[int]) -> Surd | None:
+    """Where the ray meets a triangle, but for the same factor."""
+    ox, oy, oz = eye
+    dx, dy, dz = steps
+    ax, ay, az, bx, by, bz, cx, cy, cz = corners
+    ax, ay, az, bx, by, bz, cx, cy, cz = ax - ox, ay - oy, az - oz, bx - ox, by - oy, bz - oz, cx - ox, cy - oy, cz - oz
+    x, y, z = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
+    volume, first = ax * x + ay * y + az * z, dx * x + dy * y + dz * z
+    second = dx * (cy * az - cz * ay) + dy * (cz * ax - cx * az) + dz * (cx * ay - cy * ax)
+    third = dx * (ay * bz - az * by) + dy * (az * bx - ax * bz) + dz * (ax * by - ay * bx)
+    if volume < 0:
+        volume, first, second, third = -volume, -first, -second, -third
+    if volume == 0 or first < 0 or second < 0 or third < 0:
+        return None
+    return volume * a, 1, 0, first + second + third
 
 
 def _roots(
@@ -180,8 +216,8 @@ def _nearest_float(surd: Surd, over: int, under: int) -> float:
 
     As many bits of the surd are worked out as it takes for the float64 to be the same, whatever the others may be.
     """
-    base, sign, radicand = surd
-    bits = _BITS
+    base, sign, radicand, divisor = surd
+    bits, under = _BITS, under * divisor
     try:
         while radicand:
             up = bits - radicand.bit_length() // 2
@@ -226,8 +262,11 @@ def _sign(number: int) -> int:
 
 def _is_less(surd: Surd, other: Surd) -> bool:
     """Whether one root of a ray comes before another."""
-    base, sign, radicand = surd
-    less_base, less_sign, less_radicand = other
+    base, sign, radicand, divisor = surd
+    less_base, less_sign, less_radicand, less_divisor = other
+    if divisor != less_divisor:
+        base, radicand = base * less_divisor, radicand * less_divisor**2
+        less_base, less_radicand = less_base * divisor, less_radicand * divisor**2
     return _sign_with_two_roots(base - less_base, sign, radicand, less_sign, less_radicand) < 0
 
 

@@ -11,15 +11,16 @@ from typing import NamedTuple
 import numpy as np
 
 from raytracer import backend, plain
-from raytracer.arrays import Balls, Candidates, First, Grid, Hits, Seen
-from raytracer.boxes import make_lens
+from raytracer.arrays import Balls, Candidates, Facets, First, Grid, Hits, Seen
+from raytracer.boxes import Lens, facet_boxes, make_lens
 from raytracer.camera import Raster, eye_grid, fine_columns, fine_rows, rows_of, spread, squares, twofold_eye_rays
 from raytracer.certified import LARGEST_SPREAD, fine_direction, refine
+from raytracer.facets import see_facets
 from raytracer.methods import CERTIFIED
 from raytracer.plain import candidates_of, xyz
 from raytracer.scene import Scene
 from raytracer.settle import Bundle, Index, Targets, in_twofold, known_in_integers, polish, settle
-from raytracer.units import sphere_units
+from raytracer.units import scene_units
 from raytracer.usual import balls, usual_rows
 
 # A NaN or an infinity makes a decision uncertain, and the next level takes it.
@@ -32,12 +33,13 @@ class Eye(NamedTuple):
     raster: Raster
     unit: int  # lengths below are counted in 2**unit of the scene's
     origin: np.ndarray  # (3,)
-    order: np.ndarray  # int32 (s,), the places in the file of the spheres in view
-    all_shapes: bool  # whether these are all shapes of the file
-    targets: Targets  # the spheres in view
+    order: np.ndarray  # int32 (s + n,), the places in the file of the shapes in view: spheres, then triangles
+    all_shapes: bool  # whether these are all shapes of the file, in its order
+    targets: Targets  # the shapes in view
     grid: Grid
-    seen: Seen
-    boxes: np.ndarray  # int32 (s, 4), see `plain.bound`
+    seen: Seen  # the spheres
+    facets: Facets  # the triangles
+    boxes: np.ndarray  # int32 (s + n, 4), see `plain.bound`
     method: str  # a row of METHODS
     balls: Balls | None  # the spheres in view as that method sees them, if it is a usual one
     tests: int  # how many times a ray is tested against a sphere, in float64
@@ -54,14 +56,16 @@ class Eye(NamedTuple):
     def hits(self, rows: slice, worker: int = 0, polished: bool = False) -> Hits:
         """What the rays of these rows of the picture hit first: t good enough to be shaded, or to the last digit."""
         if self.balls is not None:
-            t, index = usual_rows(self.method, self.raster, self.balls, self.boxes, rows, self.path)
-            return Hits(t, self._places(index))
+            hits = usual_rows(self.method, self.raster, self.balls, self.boxes[: self.spheres], rows, self.path)
+            self._add_facets(hits, rows)
+            return Hits(hits.t, self._places(hits.index))
         first = self._first(rows)
         hits = Hits(first.k / squares(rows_of(self.grid, rows)), first.index)
         settle(hits, first.unsure, self._pixels_of(rows), self.targets)
         if polished:
-            left = self._refine(hits, rows, (hits.index >= 0) & ~first.unsure)
-            polish(hits, np.nonzero(left), self._pixels_of(rows), self.targets)
+            sure = (hits.index >= 0) & ~first.unsure
+            left = self._refine(hits, rows, sure & (hits.index < self.spheres))
+            polish(hits, np.nonzero(left | (sure & (hits.index >= self.spheres))), self._pixels_of(rows), self.targets)
         return Hits(np.ldexp(hits.t, self.unit) if self.unit else hits.t, self._places(hits.index))
 
     @_NOT_A_NUMBER_IS_NO_ERROR
@@ -91,8 +95,23 @@ class Eye(NamedTuple):
     def _first(self, rows: slice) -> First:
         """What float64 makes of these rows."""
         first = First.nothing_yet((rows.stop - rows.start, self.raster.width))
-        plain.first_of_grid(self.grid, self.seen, self.boxes, rows, first)
+        plain.first_of_grid(self.grid, self.seen, self.boxes[: self.spheres], rows, first)
+        plain.first_facets_of_grid(self.grid, self.facets, self.boxes[self.spheres :], rows, first, self.spheres)
         return first
+
+    def _add_facets(self, hits: Hits, rows: slice) -> None:
+        """The triangles for a usual method, which is one for spheres: float64, nothing checked."""
+        first = First.nothing_yet(hits.t.shape)
+        squares_, boxes = squares(rows_of(self.grid, rows)), self.boxes[self.spheres :]
+        first.k[...] = np.ldexp(hits.t, -self.unit) * squares_
+        plain.first_facets_of_grid(self.grid, self.facets, boxes, rows, first, self.spheres)
+        wins = first.index >= 0
+        hits.t[wins], hits.index[wins] = np.ldexp(first.k[wins] / squares_[wins], self.unit), first.index[wins]
+
+    @property
+    def spheres(self) -> int:
+        """How many spheres are in view."""
+        return len(self.targets.balls)
 
     def _pixels_of(self, rows: slice) -> PixelsOf:
         return PixelsOf(self.raster, self.origin, self.boxes, rows.start)
@@ -133,22 +152,44 @@ def open_eye(scene: Scene, raster: Raster, method: str = CERTIFIED, path: Module
     `path` traces; by default it is chosen.
     """
     spheres, grid, lens = scene.spheres, eye_grid(raster), make_lens(raster)
-    unit, origin, everything = sphere_units(scene.camera.eye, spheres)
+    unit, origin, everything, corners = scene_units(scene)
     everything = everything[: len(spheres)]
     boxes, front = plain.bound(lens, origin, everything)
-    in_view = (boxes[:, 1] > boxes[:, 0]) & (boxes[:, 3] > boxes[:, 2])
-    order, boxes, seen_balls = spheres.order[in_view], boxes[in_view], everything[in_view]
+    in_view = _not_empty(boxes)
+    kappa, seen_balls = usable_spread(raster), everything[in_view]
+    facets, facets_boxes, kept = _facets(grid, lens, kappa, origin, corners)
+    order, boxes = (
+        np.concatenate(parts)
+        for parts in ((spheres.order[in_view], scene.triangles.order[kept]), (boxes[in_view], facets_boxes))
+    )
     known = None
     if method != CERTIFIED:  # a usual method is given the scene's own numbers
         known = balls(method, spheres.centres[in_view], spheres.radii[in_view])
     left, right, top, bottom = boxes.astype(np.int64).T
     tests = int(((right - left) * (bottom - top)).sum())
-    seen = plain.see(grid, usable_spread(raster), origin, seen_balls, front[in_view])
+    seen = plain.see(grid, kappa, origin, seen_balls, front[in_view])
     seen, sides = known_in_integers(origin, seen_balls, seen)
-    targets = Targets(seen_balls, sides, path or backend.choose(tests, len(raster.bands()) * len(boxes)))
+    chosen = path or backend.choose(tests, len(raster.bands()) * len(boxes))
+    targets = Targets(seen_balls, sides, chosen, corners[kept], order)
+    in_order = len(order) == len(scene) and not (len(spheres) and len(corners))
     return Eye(
-        raster, unit, origin, order, len(order) == len(scene), targets, grid, seen, boxes, method, known, tests
+        raster, unit, origin, order, in_order, targets, grid, seen, facets, boxes, method, known, tests
     )  # fmt: skip
+
+
+def _facets(
+    grid: Grid, lens: Lens, kappa: float, origin: np.ndarray, corners: np.ndarray
+) -> tuple[Facets, np.ndarray, np.ndarray]:
+    """The triangles in view, their boxes, and which they are: int (n,)."""
+    boxes = facet_boxes(lens, corners - origin)
+    kept = np.flatnonzero(_not_empty(boxes))
+    facets = see_facets(grid, kappa, origin, corners[kept])
+    kept, facets = kept[facets.faces], Facets._make(array[facets.faces] for array in facets)
+    return facets, boxes[kept], kept
+
+
+def _not_empty(boxes: np.ndarray) -> np.ndarray:
+    return (boxes[:, 1] > boxes[:, 0]) & (boxes[:, 3] > boxes[:, 2])  # type: ignore[no-any-return]
 
 
 def usable_spread(raster: Raster) -> float:

@@ -9,7 +9,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from raytracer.arrays import Balls, Candidates, First, Grid, Nearest, Rays, Seen, Sides, TwofoldRays, UsualRays, View
+from raytracer.arrays import (
+    Balls,
+    Candidates,
+    Facets,
+    First,
+    Grid,
+    Nearest,
+    Rays,
+    Seen,
+    Sides,
+    TwofoldRays,
+    UsualRays,
+    View,
+)
 from raytracer.boxes import Lens, beside, box_of
 from raytracer.camera import squares
 from raytracer.certified import (
@@ -17,7 +30,9 @@ from raytracer.certified import (
     Three,
     U,
     approach,
+    approach_facet,
     arrive,
+    beside_edges,
     contends,
     edge_of,
     inner,
@@ -79,6 +94,21 @@ def first_of_grid(grid: Grid, seen: Seen, boxes: np.ndarray, rows: slice, first:
         k, wins, unsure = _meet_grid(grid, *box, Seen._make(array[i] for array in seen), part.k)
         part.k[...] = np.where(wins, k, part.k)
         part.index[wins] = i
+        part.unsure[...] |= unsure
+
+
+def first_facets_of_grid(grid: Grid, facets: Facets, boxes: np.ndarray, rows: slice, first: First, number: int) -> None:
+    """The same for triangles, of which the first has this number."""
+    for i in np.flatnonzero((boxes[:, 2] < rows.stop) & (boxes[:, 3] > rows.start)).tolist():
+        left, right, top, bottom = boxes[i].tolist()
+        box = slice(max(top, rows.start), min(bottom, rows.stop)), slice(left, right)
+        part = First._make(array[box[0].start - rows.start : box[0].stop - rows.start, left:right] for array in first)
+        across, up = grid.across[None, box[1]], grid.up[box[0], None]
+        values = [across * u + (up * v + w) for u, v, w in facets.rows[i].reshape(4, 3)]
+        low, _ = beside_edges(*values[:3])
+        k, wins, unsure = approach_facet(low, values[3], facets.distance[i], squares(grid, *box), part.k)
+        part.k[...] = np.where(wins, k, part.k)
+        part.index[wins] = number + i
         part.unsure[...] |= unsure
 
 

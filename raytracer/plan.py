@@ -59,6 +59,8 @@ class Plan:
     def painter(self) -> str:
         """The kernel that paints the whole stage, or nothing if numpy does."""
         painter = self.stage.painter if self.on_screen and not self._has_far_lights else ""
+        if painter == "paint_diffuse" and len(self.scene.triangles):
+            return "paint_diffuse_any"
         return f"{painter}_unchecked" if painter and self.unchecked else painter
 
     @property
@@ -113,7 +115,7 @@ def _reasons(plan: Plan) -> Iterator[str]:
     if stage.needs_hits:
         yield from _reasons_for_tracing(plan)
     else:
-        yield "no ray is shot: the boxes of pixels that can see a sphere are all that is counted"
+        yield "no ray is shot: the boxes of pixels that can see a shape are all that is counted"
     if not stage.needs_normals:
         yield "no point, no normal: this stage asks only what is hit"
     yield from _reasons_for_lights(plan)
@@ -142,16 +144,17 @@ def _reasons_for_lights(plan: Plan) -> Iterator[str]:
 
 def _reasons_for_tracing(plan: Plan) -> Iterator[str]:
     eye, scene = plan.eye, plan.scene
-    total, seen = len(scene.spheres), len(eye.order)
+    total, seen = len(scene), len(eye.order)
+    word = "shape" if len(scene.triangles) and len(scene.spheres) else "triangle" if len(scene.triangles) else "sphere"
     if seen < total:
-        yield f"{_count(range(total - seen), 'sphere')} of {total} cannot be seen: behind the eye or beside the picture"
+        yield f"{_count(range(total - seen), word)} of {total} cannot be seen: behind the eye or beside the picture"
     if not seen:
-        yield "no sphere in view: no ray is shot"
+        yield f"no {word} in view: no ray is shot"
         return
     pixels = plan.raster.width * plan.raster.height
     how = "sorted into tiles of the screen, each tested" if plan.on_screen else "tested one after the other, each"
     yield (
-        f"{_count(range(seen), 'sphere')}: {how} within the box of pixels that can see it, "
+        f"{_count(range(seen), word)}: {how} within the box of pixels that can see it, "
         f"{eye.tests / pixels:.3g} tests a pixel"
     )
     if plan.path is plain and not backend.why_no_compiler():
@@ -165,8 +168,6 @@ def _reasons_for_tracing(plan: Plan) -> Iterator[str]:
 
 
 def _warnings(scene: Scene) -> Iterator[str]:
-    if len(scene.triangles):
-        yield f"{_count(scene.triangles, 'triangle')} not drawn: only spheres are, so far"
     if fault := backend.why_no_compiler():
         yield f"{fault}: numpy draws the same picture, slowly"
 

@@ -13,14 +13,16 @@ from typing import Any
 import numpy as np
 
 from raytracer import certified, exact, methods, plain
-from raytracer.camera import directions, eye_grid, twofold_eye_rays
+from raytracer.arrays import First
+from raytracer.camera import directions, eye_grid, squares, twofold_eye_rays
 from raytracer.exact import Root, quotient
-from raytracer.eye import Eye
+from raytracer.eye import Eye, usable_spread
+from raytracer.facets import see_facets
 from raytracer.image import to_bytes
 from raytracer.methods import CERTIFIED, METHODS
 from raytracer.plan import Plan, make_plan
 from raytracer.render import block_of, open_tracer, whole_of
-from raytracer.scene import Colour, Scene, Shape, Sphere, Vector, vector
+from raytracer.scene import Colour, Scene, Shape, Sphere, Triangle, Vector, vector
 from raytracer.stages import Block
 
 _DIGITS = 17  # of a float64
@@ -41,7 +43,7 @@ class Figure:
 
 @dataclass(frozen=True)
 class Meeting:
-    """A ray and one of the spheres near it. t and true_t are +inf where the method, or the truth, sees no hit.
+    """A ray and one of the shapes near it, for a triangle without figures. t and true_t are +inf where the method, or the truth, sees no hit.
 
     For `certified`, t is what float64 makes of it, and NaN where that is not certain.
     """
@@ -54,7 +56,7 @@ class Meeting:
 
     def lines(self) -> Iterator[str]:
         yield f"shape {self.index}, {describe(self.shape)}"
-        yield f"  {'':7}{'as computed |':26}in truth"
+        yield f"  {'':7}{'as computed |' if self.figures else 'as computed':26}in truth"
         yield from map(str, self.figures)
         yield f"  {'t':7}{_hit_or_miss(self.t):26}{_hit_or_miss(self.true_t)}"
 
@@ -86,7 +88,7 @@ class Pixel:
     t: float
     level: str  # what it took to be certain, or nothing for another method
     lead: float | None  # by how much the winner's t is smaller than that of the next, if any
-    meetings: tuple[Meeting, ...]  # the spheres whose box of pixels this one lies in, nearest first
+    meetings: tuple[Meeting, ...]  # the shapes whose box of pixels this one lies in, nearest first
     point: Vector | None
     normal: Vector | None
     lights: tuple[Lighting, ...]
@@ -123,7 +125,18 @@ class Pixel:
 
     def as_pytest(self) -> str:
         """A test of `ray_intersect_scene`'s kind, with the truth of this pixel's ray, to paste into one's own tests."""
-        spheres = [(meeting.shape.centre, meeting.shape.radius) for meeting in self.meetings]
+        shapes = [meeting.shape for meeting in self.meetings]
+        spheres = [(shape.centre, shape.radius) for shape in shapes if isinstance(shape, Sphere)]
+        triangles = [shape.vertices for shape in shapes if isinstance(shape, Triangle)]
+        loops = [
+            f"    spheres = {spheres!r}  # centre, radius",
+            "    ts = [intersect(origin, direction, c, r) for c, r in spheres]",
+        ]
+        if triangles:
+            loops += [
+                f"    triangles = {triangles!r}",
+                "    ts += [intersect_triangle(origin, direction, *corners) for corners in triangles]",
+            ]
         true = min((meeting.true_t for meeting in self.meetings), default=np.inf)
         truth = f"pytest.approx({true!r}, rel=1e-12)" if np.isfinite(true) else "float('inf')  # a miss"
         name = f"test_pixel_{self.x}_{self.y}_of_{self.width}_by_{self.height}"
@@ -134,9 +147,8 @@ class Pixel:
                 "",
                 f"def {name}():",
                 f"    origin, direction = {self.eye!r}, {self.direction!r}",
-                f"    spheres = {spheres!r}  # centre, radius",
-                "    t = min((intersect(origin, direction, c, r) for c, r in spheres), default=float('inf'))",
-                f"    assert t == {truth}",
+                *loops,
+                f"    assert min(ts, default=float('inf')) == {truth}",
             ]
         )
 
@@ -197,7 +209,7 @@ def _lightings(block: Block, k: int) -> Iterator[Lighting]:
 
 
 def _meetings(plan: Plan, x: int, y: int) -> tuple[Meeting, ...]:
-    """The spheres in whose boxes the pixel lies, the nearest first, no more than a person reads."""
+    """The shapes in whose boxes the pixel lies, the nearest first, no more than a person reads."""
     left, right, top, bottom = plan.eye.boxes.T
     near = np.flatnonzero((left <= x) & (x < right) & (top <= y) & (y < bottom))
     direction = plan.raster.exact_direction(x, y)
@@ -206,13 +218,25 @@ def _meetings(plan: Plan, x: int, y: int) -> tuple[Meeting, ...]:
 
 
 def _meeting(plan: Plan, x: int, y: int, direction: tuple[Fraction, ...], index: int) -> Meeting:
-    sphere = plan.scene.shape(index)
-    assert isinstance(sphere, Sphere)
-    eye = plan.scene.camera.eye
+    sphere, eye = plan.scene.shape(index), plan.scene.camera.eye
+    if isinstance(sphere, Triangle):
+        return _meeting_with_triangle(plan, x, y, index, sphere)
     truth = exact.line(eye, direction, sphere.centre, sphere.radius)
     true_t, _ = exact.nearest_hit(eye, direction, [(sphere.centre, sphere.radius)])
     found, t = _watched(plan.eye, x, y, sphere)
     return Meeting(index, sphere, tuple(_figures(found, truth)), t, true_t)
+
+
+def _meeting_with_triangle(plan: Plan, x: int, y: int, index: int, triangle: Triangle) -> Meeting:
+    camera, corners = plan.scene.camera, np.array([triangle.vertices])
+    numbers = [*camera.eye, *corners.ravel().tolist()]
+    true_t, _ = exact.nearest_of(numbers, *plan.raster.whole_direction(x, y), [9])
+    grid = eye_grid(plan.raster)
+    facets = see_facets(grid, usable_spread(plan.raster), np.array(camera.eye), corners)
+    first, row = First.nothing_yet((1, plan.raster.width)), slice(y, y + 1)
+    plain.first_facets_of_grid(grid, facets, np.array([[x, x + 1, y, y + 1]]), row, first, 0)
+    t = first.k[0, x] / squares(grid, row)[0, x]
+    return Meeting(index, triangle, (), float(np.nan if first.unsure[0, x] else t), true_t)
 
 
 def _watched(eye: Eye, x: int, y: int, sphere: Sphere) -> tuple[dict[str, Any], float]:

@@ -188,6 +188,11 @@ class Triangles(_Table[Triangle]):
     order: np.ndarray = field(default_factory=lambda: np.empty(0, np.int32))  # (n,) int32
     materials: Materials = Materials()
 
+    @cached_property
+    def largest(self) -> float:
+        """The largest number among the corners, without its sign; 0 if there is none."""
+        return float(np.abs(self.vertices).max(initial=0.0))
+
     def _row(self, i: int) -> Triangle:
         first, second, third = self.vertices[i]
         return Triangle((vector(first), vector(second), vector(third)), self.materials[self.material[i]])
@@ -208,6 +213,22 @@ class Scene:
     def __len__(self) -> int:
         """The number of shapes, of all kinds."""
         return len(self.spheres) + len(self.triangles)
+
+    @cached_property
+    def numbered(self) -> tuple[np.ndarray, np.ndarray]:
+        """Place in the file and row of `materials`, int32, of all shapes: rows of `spheres.balls`, then triangles."""
+        if not len(self.triangles):
+            return self.spheres.order, self.spheres.material
+        spare = np.zeros(len(self.spheres.balls) - len(self.spheres), np.int32)
+        order, material = (
+            np.concatenate([ours, spare, theirs])
+            for ours, theirs in (
+                (self.spheres.order, self.triangles.order), (self.spheres.material, self.triangles.material),
+            )
+        )  # fmt: skip
+        for array in (order, material):
+            array.flags.writeable = False
+        return order, material
 
     def shape(self, index: int) -> Shape:
         """The shape at this place among all shapes of the file, counted from 0: what `Hits.index` names."""

@@ -24,9 +24,11 @@ from numpy.lib.stride_tricks import as_strided
 
 from raytracer import plain
 from raytracer.arrays import (
+    FACET,
     Bins,
     Candidates,
     Canvas,
+    Facets,
     FineRays,
     HitRows,
     Hits,
@@ -38,16 +40,17 @@ from raytracer.arrays import (
     View,
     aligned,
 )
-from raytracer.boxes import Lens, make_lens
+from raytracer.boxes import Lens, facet_boxes, make_lens
 from raytracer.camera import Raster, eye_grid, fine_columns, fine_rows
 from raytracer.eye import bundle_of, usable_spread
+from raytracer.facets import see_facets
 from raytracer.plan import Plan
 from raytracer.pool import cores, share
 from raytracer.scene import Colour, Materials, Scene, Spheres
 from raytracer.settle import Bundle, Index, Targets, known_in_integers, polish, settled
 from raytracer.shading import to_byte
 from raytracer.stages import light_from_eye
-from raytracer.units import sphere_units
+from raytracer.units import scene_units
 
 SPARE = 8  # elements at the end of arrays that are read eight at a time
 _SPARE = 32  # list entries beyond the last that a kernel may look at
@@ -113,7 +116,7 @@ class Screen(NamedTuple):
     unit: int  # lengths below are counted in 2**unit of the scene's
     origin: np.ndarray  # (3,)
     spheres: int
-    order: np.ndarray | None  # int32 (spheres,), their places in the file; None if they are all of its shapes
+    order: np.ndarray | None  # int32, the shapes' places in the file by their numbers; None if that is the same
     view: View
     slow: Slow
     bins: Bins
@@ -123,10 +126,10 @@ class Screen(NamedTuple):
 
     @property
     def boxes(self) -> np.ndarray:
-        """The box of each sphere: int32 (spheres, 4)."""
-        boxes = self.bins.boxes.reshape(-1, 4)[: self.spheres].copy()
+        """The box of each sphere, then of each triangle: int32 (shapes, 4)."""
+        boxes = self.bins.boxes.reshape(-1, 4).copy()
         boxes[self.slow.ids] = self.slow.boxes
-        return boxes
+        return np.concatenate([boxes[: self.spheres], boxes[len(self.targets.balls) :]])
 
     def bands(self, shading: float = 0.0) -> list[slice]:
         """The picture's rows, cut between tiles into some pieces for each core, so that all are done at one time."""
@@ -247,12 +250,17 @@ class Pixels(NamedTuple):
 def open_screen(scene: Scene, raster: Raster, kernels: ModuleType, threads: int | None = None) -> Iterator[Screen]:
     """Sort the scene's spheres into the tiles of the screen. It holds until the context ends."""
     with _workspace() as workspace, np.errstate(all="ignore"):
-        unit, origin, balls = sphere_units(scene.camera.eye, scene.spheres)
-        lens, view = make_lens(raster), _view(raster, origin, balls, scene.spheres.material)
-        bins, slow_ids = _sort(workspace, kernels, lens, view, len(scene.spheres), threads)
-        slow, targets = _slow(lens, view, origin, balls, slow_ids, kernels, bins)
+        unit, origin, balls, corners = scene_units(scene)
+        order, material = scene.numbered
+        lens, grid = make_lens(raster), eye_grid(raster)
+        facets = see_facets(grid, usable_spread(raster), origin, corners) if len(corners) else None
+        view = _view(raster, origin, balls, facets, material)
+        boxes = _facet_boxes(lens, corners - origin, facets)
+        bins, slow_ids = _sort(workspace, kernels, lens, view, len(scene.spheres), boxes, threads)
+        slow, targets = _slow(lens, view, origin, balls, slow_ids, kernels)
+        targets = targets._replace(corners=corners, order=order)
         desks = [_desk(workspace, kernels, worker) for worker in range(threads or cores())]
-        order = scene.spheres.order if len(scene.triangles) and len(scene.spheres) else None
+        order = order if len(corners) and len(balls) else None
         yield Screen(raster, unit, origin, len(scene.spheres), order, view, slow, bins, targets, workspace, desks)
 
 
@@ -276,7 +284,8 @@ _NO_PAINTS = Paints(np.zeros(3), np.zeros(3), np.empty((0, 6)), Materials().diff
 
 
 _NO_SPHERES = np.empty(0)
-_NONE_SLOW = Slow(np.empty(0, np.int32), np.empty((0, 4), np.int32), Seen(*[_NO_SPHERES] * len(Seen._fields)))
+_NO_BOXES = np.empty((0, 4), np.int32)
+_NONE_SLOW = Slow(np.empty(0, np.int32), _NO_BOXES, Seen(*[_NO_SPHERES] * len(Seen._fields)))
 
 
 def make_canvas(picture: np.ndarray) -> Canvas | None:
@@ -304,26 +313,49 @@ def _desk(workspace: Workspace, kernels: ModuleType, worker: int) -> Desk:
     return Desk(scratch, doubts)
 
 
-def _view(raster: Raster, origin: np.ndarray, balls: np.ndarray, material: np.ndarray) -> View:
+def _view(raster: Raster, origin: np.ndarray, balls: np.ndarray, facets: Facets | None, material: np.ndarray) -> View:
+    table, rows, first = balls.reshape(-1), _NO_SPHERES, len(balls)
+    if facets is not None:
+        table, rows = np.concatenate([balls, facets.planes]).reshape(-1), np.zeros((len(facets.rows), FACET))
+        rows[:, :12], rows[:, 12] = facets.rows, facets.distance
+        for array in (table, rows):
+            array.flags.writeable = False  # to the kernels, arrays that can be written to are others
     grid, (x, y, z) = eye_grid(raster), origin.tolist()
     across = np.concatenate([grid.across, np.full(8, grid.across[-1])])
     up, a1, a0 = (np.append(rows, rows[-1]) for rows in (grid.up, grid.a1, grid.a0))
     return View(
         across, up, a1, a0, grid.a2, grid.u, grid.v, grid.back, grid.reach, usable_spread(raster), (x, y, z),
-        balls.reshape(-1), material,
+        table, material, rows.reshape(-1), first,
     )  # fmt: skip
 
 
+def _facet_boxes(lens: Lens, corners: np.ndarray, facets: Facets | None) -> np.ndarray:
+    """The boxes of all triangles, those that no ray meets having an empty one."""
+    if facets is None:
+        return _NO_BOXES
+    boxes = facet_boxes(lens, corners)
+    boxes[~facets.faces] = 0
+    return boxes
+
+
 def _sort(
-    workspace: Workspace, kernels: ModuleType, lens: Lens, view: View, spheres: int, threads: int | None
+    workspace: Workspace,
+    kernels: ModuleType,
+    lens: Lens,
+    view: View,
+    spheres: int,
+    facet_boxes: np.ndarray,
+    threads: int | None,
 ) -> tuple[Bins, np.ndarray]:
     """The lists of all tiles; and the slow spheres, which are in none."""
     columns = -(-(len(view.across) - 8) // kernels.TILE_WIDTH)
     rows = -(-(len(view.up) - 1) // kernels.TILE_HEIGHT)
     workers = 1 if spheres < _FEW else min(threads or cores(), _MOST_WORKERS)
     cuts = [spheres * worker // workers // 8 * 8 for worker in range(workers)] + [spheres]
-    boxes = workspace.array(4 * (spheres + 8), np.int32, "boxes")
-    counts = workspace.zeros(workers * columns * rows, np.int64, "counts").reshape(workers, -1)
+    first, shapes = view.first_facet, view.first_facet + len(facet_boxes)
+    boxes = workspace.array(4 * shapes, np.int32, "boxes")
+    boxes[4 * first :] = facet_boxes.reshape(-1)
+    counts = workspace.zeros((workers + 1) * columns * rows, np.int64, "counts").reshape(workers + 1, -1)
     starts = workspace.array(columns * rows + 1, np.int64, "starts")
     slow = 0
 
@@ -343,16 +375,22 @@ def _sort(
         kernels.fill(boxes, cuts[part], cuts[part + 1], counts[part], entries, columns)
 
     share(list(range(workers)), bound, threads, add)
+    if len(facet_boxes):
+        kernels.count(boxes, first, shapes, counts[workers], columns)
     kernels.begin(counts, starts)
+    middles = workspace.array(columns * rows, np.int64, "middles")
+    middles[:] = counts[workers]
     entries = workspace.array(int(starts[-1]) + _SPARE, np.uint64, "entries")
     entries[int(starts[-1]) :] = 0
     share(list(range(workers)), fill, threads)
+    if len(facet_boxes):
+        kernels.fill(boxes, first, shapes, counts[workers], entries, columns)
     which = np.flatnonzero(boxes[: 4 * spheres : 4] < 0) if slow else np.empty(0, np.int64)
-    return Bins(boxes, starts, entries, columns), which.astype(np.int32)
+    return Bins(boxes, starts, entries, middles, columns), which.astype(np.int32)
 
 
 def _slow(
-    lens: Lens, view: View, origin: np.ndarray, balls: np.ndarray, ids: np.ndarray, kernels: ModuleType, bins: Bins
+    lens: Lens, view: View, origin: np.ndarray, balls: np.ndarray, ids: np.ndarray, kernels: ModuleType
 ) -> tuple[Slow, Targets]:
     """What has to be known of the slow spheres; and all spheres as the levels above float64 want them."""
     if not len(ids):

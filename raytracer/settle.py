@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from fractions import Fraction
+from itertools import chain
 from types import ModuleType
 from typing import NamedTuple, Protocol
 
@@ -12,6 +13,7 @@ import numpy as np
 from raytracer import exact
 from raytracer.arrays import Candidates, Hits, Nearest, Seen, Sides, TwofoldRays
 from raytracer.certified import CLOSE, U, contends
+from raytracer.facets import certain_misses, fine_distance
 from raytracer.plain import known_sides, rough_meeting
 from raytracer.scene import vector
 
@@ -20,12 +22,23 @@ _CHUNK = 1 << 14  # pairs of a ray and a sphere that are looked at together
 Index = tuple[np.ndarray, ...]
 
 
+_NO_CORNERS, _NO_PLACES = np.empty((0, 3, 3)), np.empty(0, np.int32)
+
+
 class Targets(NamedTuple):
-    """The spheres that rays are traced against, and who traces."""
+    """The shapes that rays are traced against, and who traces. Triangles are numbered after the rows of balls."""
 
     balls: np.ndarray  # (s, 4): x, y, z, radius
     sides: Sides  # what is known of c from where all rays start
     path: ModuleType  # `raytracer.plain` or `raytracer.kernels`
+    corners: np.ndarray = _NO_CORNERS  # (n, 3, 3), of triangles
+    order: np.ndarray = _NO_PLACES  # int32 (s + n,), places in the file; of no use where there are no triangles
+
+    def numbers_of(self, i: int) -> list[float]:
+        """What a shape is made of, for `exact.nearest_of`."""
+        flat = self.balls[i] if i < len(self.balls) else self.corners[i - len(self.balls)].reshape(-1)
+        numbers: list[float] = flat.tolist()
+        return numbers
 
 
 class Bundle(NamedTuple):
@@ -34,6 +47,10 @@ class Bundle(NamedTuple):
     origins: np.ndarray  # (n, 3)
     rays: TwofoldRays  # (n,)
     exact_direction: Callable[[int], tuple[Sequence[float], int]]  # of ray k of these: numbers, and their divisor
+
+    def some(self, which: np.ndarray) -> tuple[np.ndarray, TwofoldRays]:
+        """Origins and directions of some of them."""
+        return self.origins[which], TwofoldRays._make(array[which] for array in self.rays)
 
 
 class Source(Protocol):
@@ -83,10 +100,14 @@ def settled(source: Source, which: Index, targets: Targets) -> Hits:
 
 
 def in_twofold(bundle: Bundle, candidates: Candidates, targets: Targets) -> Nearest:
-    """What two-fold arithmetic makes of these rays."""
-    balls, sides, path = targets
+    """What two-fold arithmetic makes of these rays. Those that may meet a triangle it leaves to the integers."""
     found = Nearest.nothing_yet((len(bundle.origins),))
-    path.nearest_twofold(bundle.origins, bundle.rays, candidates, balls, sides, found)
+    if len(targets.corners):
+        is_sphere = candidates.ids < len(targets.balls)
+        row = candidates.rows(np.arange(len(found.unsure)))
+        found.unsure[row[~is_sphere]] = True
+        candidates = candidates.only(is_sphere)
+    targets.path.nearest_twofold(bundle.origins, bundle.rays, candidates, targets.balls, targets.sides, found)
     return found
 
 
@@ -94,11 +115,17 @@ def polish(hits: Hits, which: Index, source: Source, targets: Targets) -> None:
     """Bring the t of these hits to the last digit."""
     if not which[0].size:
         return
-    bundle, (balls, sides, path), spheres = source.bundle(which), targets, hits.index[which]
-    t = path.polish(bundle.origins, bundle.rays, balls[spheres], known_sides(sides, spheres))
+    bundle, shapes, t = source.bundle(which), hits.index[which], np.empty(len(which[0]))
+    first_facet = len(targets.balls)
+    spheres, facets = np.flatnonzero(shapes < first_facet), np.flatnonzero(shapes >= first_facet)
+    if spheres.size:
+        (origins, rays), balls = bundle.some(spheres), targets.balls[shapes[spheres]]
+        t[spheres] = targets.path.polish(origins, rays, balls, known_sides(targets.sides, shapes[spheres]))
+    if facets.size:
+        t[facets] = fine_distance(*bundle.some(facets), targets.corners[shapes[facets] - first_facet])
     for k in np.flatnonzero(~np.isfinite(t)).tolist():
-        direction, unit = bundle.exact_direction(k)
-        t[k], _ = exact.nearest_of([*bundle.origins[k].tolist(), *balls[spheres[k]].tolist()], direction, unit)
+        numbers = targets.numbers_of(int(shapes[k]))
+        t[k], _ = exact.nearest_of([*bundle.origins[k].tolist(), *numbers], *bundle.exact_direction(k), [len(numbers)])
     hits.t[which] = t
 
 
@@ -109,23 +136,40 @@ def _settle_exactly(found: Nearest, bundle: Bundle, candidates: Candidates, targ
     cuts = np.searchsorted(pairs, np.arange(_CHUNK, pairs[-1], _CHUNK))
     for some in np.split(open_rays, np.unique(cuts)):
         contend = _contenders(bundle, candidates.of(some), some, targets)
-        lengths, ids = targets.balls[contend.ids].ravel().tolist(), contend.ids.tolist()
-        starts, ts, indices = contend.starts.tolist(), [], []
-        rays = zip(some.tolist(), bundle.origins[some].tolist(), starts, starts[1:], strict=False)
-        for k, origin, start, end in rays:
-            t, i = exact.nearest_of(origin + lengths[4 * start : 4 * end], *bundle.exact_direction(k))
+        shapes, sizes = _numbers_of(contend, targets)
+        ids, starts = contend.ids.tolist(), contend.starts.tolist()
+        ends = np.concatenate([[0], np.cumsum(sizes)])[contend.starts].tolist()
+        ts, indices = [], []
+        for j, (k, origin) in enumerate(zip(some.tolist(), bundle.origins[some].tolist(), strict=True)):
+            kinds = sizes[starts[j] : starts[j + 1]]
+            t, i = exact.nearest_of(origin + shapes[ends[j] : ends[j + 1]], *bundle.exact_direction(k), kinds)
             ts.append(t)
-            indices.append(ids[start + i] if i >= 0 else -1)
+            indices.append(ids[starts[j] + i] if i >= 0 else -1)
         found.t[some], found.index[some] = ts, indices
 
 
+def _numbers_of(candidates: Candidates, targets: Targets) -> tuple[list[float], list[int]]:
+    """The numbers of all candidates, one behind the other, and how many each has."""
+    if not len(targets.corners):
+        return targets.balls[candidates.ids].ravel().tolist(), [4] * len(candidates.ids)
+    shapes = [targets.numbers_of(i) for i in candidates.ids.tolist()]
+    return list(chain.from_iterable(shapes)), list(map(len, shapes))
+
+
 def _contenders(bundle: Bundle, candidates: Candidates, some: np.ndarray, targets: Targets) -> Candidates:
-    """Those candidates of some rays which float64 cannot rule out."""
+    """Those candidates of some rays which float64 cannot rule out, in the order of the file."""
     row, ids = candidates.rows(np.arange(len(some))), candidates.ids
-    rays = TwofoldRays._make(array[some][row] for array in bundle.rays)
-    t, error, low = rough_meeting(bundle.origins[some][row], rays, targets.balls[ids])
+    origins, rays = bundle.some(some[row])
+    contend, is_sphere = np.ones(len(ids), bool), ids < len(targets.balls)
+    of_spheres = TwofoldRays._make(array[is_sphere] for array in rays)
+    t, error, low = rough_meeting(origins[is_sphere], of_spheres, targets.balls[ids[is_sphere]])
     farthest = np.full(len(some), np.inf)
-    np.fmin.at(farthest, row, t + error)
-    contend = contends(t, error, low, farthest[row], 0.0)
-    starts = np.concatenate([[0], np.cumsum(np.bincount(row[contend], minlength=len(some)))])
-    return Candidates(starts.astype(np.int64), ids[contend])
+    np.fmin.at(farthest, row[is_sphere], t + error)
+    contend[is_sphere] = contends(t, error, low, farthest[row[is_sphere]], 0.0)
+    if len(targets.corners):
+        corners = targets.corners[ids[~is_sphere] - len(targets.balls)]
+        of_facets = TwofoldRays._make(array[~is_sphere] for array in rays)
+        contend[~is_sphere] = ~certain_misses(origins[~is_sphere], of_facets, corners)
+        in_order = np.lexsort((targets.order[ids], row))
+        return Candidates(candidates.starts, ids[in_order]).only(contend[in_order])
+    return candidates.only(contend)

@@ -12,6 +12,7 @@ import numpy as np
 from raytracer.twofold import Number, select
 
 Three = tuple[Number, Number, Number]
+Four = tuple[Number, Number, Number, Number]
 
 _SMALL_STEP = 2.0**-20
 _FARTHEST_GREY = 0.15
@@ -26,6 +27,19 @@ def land(t: Number, d: Three, away: Three, radius: Number) -> tuple[Three, Three
     step = select(abs(step) < _SMALL_STEP * t, step, 0.0)  # a ray that only grazes leads anywhere
     x, y, z = step * d[0], step * d[1], step * d[2]
     return (p[0] - x, p[1] - y, p[2] - z), (n[0] - x, n[1] - y, n[2] - z)
+
+
+def land_on_any(t: Number, d: Three, eye: Three, row: Four, flat: Number) -> tuple[Three, Three, Number]:
+    """P, n = r·N and r of a hit on a sphere, its row being centre and radius, or where `flat` on a triangle.
+
+    A triangle's row is as in `Facets.planes`; r is 1, and P is where the ray meets the plane, whatever t is.
+    """
+    x, y, z, w = row
+    p, n = land(t, d, (eye[0] - x, eye[1] - y, eye[2] - z), w)
+    along = w / (x * d[0] + y * d[1] + z * d[2])
+    p = select(flat, along * d[0], p[0]), select(flat, along * d[1], p[1]), select(flat, along * d[2], p[2])
+    n = select(flat, x, n[0]), select(flat, y, n[1]), select(flat, z, n[2])
+    return p, n, select(flat, 1.0, w)
 
 
 def towards(p: Three, n: Three, light: Three) -> tuple[Number, Number]:

@@ -15,8 +15,9 @@ import numpy as np
 from raytracer import shading
 from raytracer.arrays import Hits
 from raytracer.camera import Raster, Vectors, directions, directions_of, eye_grid
+from raytracer.facets import planes_of
 from raytracer.scene import Camera, Colour, Light, Scene
-from raytracer.units import sphere_units
+from raytracer.units import scene_units
 
 DUMMY = (0.8, 0.2, 0.3)
 BLACK, WHITE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
@@ -48,10 +49,28 @@ class Block:
         return self.hits.index >= 0
 
     @cached_property
-    def _sphere(self) -> np.ndarray:
-        """Which sphere is hit: int (hits,)."""
-        shape = self.hits.index[self.hit]
-        return np.searchsorted(self.scene.spheres.order, shape) if len(self.scene.triangles) else shape
+    def _flat(self) -> np.ndarray:
+        """Where a triangle is hit, not a sphere: bool (hits,)."""
+        spheres, shape = self.scene.spheres.order, self.hits.index[self.hit]
+        if not len(self.scene.triangles):
+            return np.zeros(len(shape), bool)
+        place = np.searchsorted(spheres, shape)
+        return np.append(spheres, -1)[place] != shape  # type: ignore[no-any-return]
+
+    @cached_property
+    def _number(self) -> np.ndarray:
+        """Which sphere is hit, or which triangle: int (hits,)."""
+        scene, shape = self.scene, self.hits.index[self.hit]
+        if not len(scene.triangles):
+            return shape
+        spheres, facets = (np.searchsorted(table.order, shape) for table in (scene.spheres, scene.triangles))
+        return np.where(self._flat, facets, spheres)
+
+    def _of(self, spheres: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+        """The rows of what is hit, in tables of all spheres and of all triangles."""
+        found = np.empty((len(self._number), *spheres.shape[1:]), spheres.dtype)
+        found[~self._flat], found[self._flat] = spheres[self._number[~self._flat]], triangles[self._number[self._flat]]
+        return found
 
     @cached_property
     def _directions(self) -> Vectors:
@@ -64,27 +83,33 @@ class Block:
     @cached_property
     def _unit(self) -> int:
         """Lengths are counted in 2**unit where their squares would be beyond float64."""
-        return sphere_units(self.scene.camera.eye, self.scene.spheres)[0]
+        return self._units[0]
 
     @cached_property
-    def _landed(self) -> tuple[shading.Three, shading.Three]:
-        """P, from the eye to the hit points, and r·N, from the spheres' centres to them, in units: arrays (hits,)."""
-        eye, balls = np.ldexp(self.scene.camera.eye, -self._unit), np.ldexp(self._balls, -self._unit)
+    def _units(self) -> tuple[int, np.ndarray, np.ndarray, np.ndarray]:
+        return scene_units(self.scene)
+
+    @cached_property
+    def _rows(self) -> np.ndarray:
+        """What is hit, in units: a sphere's centre and radius, or a triangle's plane as seen from the eye: (hits, 4)."""
+        _, eye, balls, corners = self._units
+        if not self._flat.any():
+            return balls[self._number]
+        rows = np.empty((len(self._number), 4))
+        rows[~self._flat] = balls[self._number[~self._flat]]
+        rows[self._flat] = planes_of(eye, corners[self._number[self._flat]])
+        return rows
+
+    @cached_property
+    def _landed(self) -> tuple[shading.Three, shading.Three, np.ndarray]:
+        """P, from the eye to the hit points, and r·N, and r, in units: arrays (hits,)."""
         x, y, z = (component[self.hit] for component in self._directions)
-        away = eye[0] - balls[:, 0], eye[1] - balls[:, 1], eye[2] - balls[:, 2]
-        return shading.land(np.ldexp(self.hits.t[self.hit], -self._unit), (x, y, z), away, balls[:, 3])
+        row, t = self._rows.T, np.ldexp(self.hits.t[self.hit], -self._unit)
+        return shading.land_on_any(t, (x, y, z), self._units[1], (row[0], row[1], row[2], row[3]), self._flat)
 
     @property
     def _from_eye(self) -> shading.Three:
         return self._landed[0]
-
-    @property
-    def _from_centre(self) -> shading.Three:
-        return self._landed[1]
-
-    @cached_property
-    def _balls(self) -> np.ndarray:
-        return self.scene.spheres.balls[self._sphere]
 
     @cached_property
     def from_eye(self) -> np.ndarray:
@@ -93,8 +118,9 @@ class Block:
 
     @cached_property
     def normals(self) -> np.ndarray:
-        """Unit normals at the hit points, outwards: (hits, 3)."""
-        return np.stack(self._from_centre, axis=-1) / np.ldexp(self._balls[:, 3], -self._unit)[:, None]
+        """Unit normals at the hit points, a sphere's outwards, a triangle's towards the eye: (hits, 3)."""
+        _, normal, radius = self._landed
+        return np.stack(normal, axis=-1) / radius[:, None]
 
     @cached_property
     def points(self) -> np.ndarray:
@@ -111,13 +137,18 @@ class Block:
         nearer = max(0, int(np.frexp(np.abs(place).max())[1]) - LIGHT_RANGE)
         p = tuple(np.ldexp(x, -nearer) for x in self._from_eye) if nearer else self._from_eye
         x, y, z = np.ldexp(place, -nearer).tolist()
-        facing, square = shading.towards(p, self._from_centre, (x, y, z))
-        return shading.cosine(facing, square, np.ldexp(self._balls[:, 3], -self._unit))
+        _, normal, radius = self._landed
+        facing, square = shading.towards(p, normal, (x, y, z))
+        return shading.cosine(facing, square, radius)
 
     @cached_property
     def diffuse(self) -> np.ndarray:
         """Diffuse colours of what is hit: (hits, 3)."""
-        return self.scene.materials.table[self.scene.spheres.material[self._sphere], 0:3]
+        return self.scene.materials.table[self._material, 0:3]
+
+    @cached_property
+    def _material(self) -> np.ndarray:
+        return self._of(self.scene.spheres.material, self.scene.triangles.material)
 
     def paint(
         self, colours: np.ndarray | tuple[float, float, float], elsewhere: tuple[float, float, float]
@@ -219,7 +250,7 @@ def error(block: Block) -> np.ndarray:
 
 
 def cost(block: Block) -> np.ndarray:
-    """How many spheres each pixel is tested against: those in whose boxes it lies."""
+    """How many shapes each pixel is tested against: those in whose boxes it lies."""
     assert block.tests is not None
     return _on_scale(block.tests, TESTS)
 
@@ -314,7 +345,7 @@ STAGES = {
         "e", edges, "the borders between different shapes", needs_whole=True, painter="paint_edges", flat=black
     ),
     "cost": Stage(
-        "k", cost, "how many spheres each pixel is tested against", needs_hits=False, needs_tests=True,
+        "k", cost, "how many shapes each pixel is tested against", needs_hits=False, needs_tests=True,
         legend=TESTS_LEGEND,
     ),
     "error": Stage(

@@ -84,11 +84,8 @@ class GivenRays(NamedTuple):
 
     def hits(self) -> Hits:
         """What they hit, t to the last digit."""
-        nearest, rays, (balls, _, path) = (
-            Nearest.nothing_yet((len(self.origins),)),
-            given_rays(self.directions),
-            self.targets,
-        )
+        nearest, rays = Nearest.nothing_yet((len(self.origins),)), given_rays(self.directions)
+        balls, path = self.targets.balls, self.targets.path
         if self.tree is None:
             path.nearest_given(self.origins, rays, balls, nearest)
         else:

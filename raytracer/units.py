@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from raytracer.scene import Spheres
+from raytracer.scene import Scene
 
 _TOO_SMALL, _TOO_LARGE = 1e-50, 1e50
 
@@ -20,14 +18,15 @@ def in_units(*lengths: np.ndarray) -> tuple[int, list[np.ndarray]]:
     return (0, list(lengths)) if _is_usual(largest) else _scaled(largest, *lengths)
 
 
-def sphere_units(eye: Sequence[float], spheres: Spheres) -> tuple[int, np.ndarray, np.ndarray]:
-    """`in_units` for an eye (3,) and spheres: e, the eye, and the spheres' `balls`."""
-    origin, largest = np.array(eye), max(spheres.largest, *map(abs, eye))
+def scene_units(scene: Scene) -> tuple[int, np.ndarray, np.ndarray, np.ndarray]:
+    """`in_units` for a scene: e, the eye (3,), the spheres' `balls`, the triangles' corners (n, 3, 3)."""
+    eye, spheres, triangles = scene.camera.eye, scene.spheres, scene.triangles
+    origin, largest = np.array(eye), max(spheres.largest, triangles.largest, *map(abs, eye))
     if _is_usual(largest):
-        return 0, origin, spheres.balls
-    unit, (origin, balls) = _scaled(largest, origin, spheres.balls)
+        return 0, origin, spheres.balls, triangles.vertices
+    unit, (origin, balls, corners) = _scaled(largest, origin, spheres.balls, triangles.vertices)
     balls.flags.writeable = False  # to the kernels, arrays that can be written to are others
-    return unit, origin, balls
+    return unit, origin, balls, corners
 
 
 def _is_usual(largest: float) -> bool:

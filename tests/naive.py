@@ -17,21 +17,23 @@ def diffuse_picture(path: Path, width: int, height: int, shift: float = 0.0) -> 
     unit = rays / lengths[..., None]
     nearest = np.full((height, width), np.inf)
     colours = np.broadcast_to(np.array(scene["background"]), (height, width, 3)).copy()
-    for centre, radius, material in scene["spheres"]:
-        distance = sphere_distance(np.array(scene["eye"]), unit, np.array(centre), radius)
+    eye = np.array(scene["eye"], float)
+    for kind, *shape, material in scene["shapes"]:
+        distance = (sphere_distance if kind == "sphere" else triangle_distance)(eye, unit, *shape)
         closer = distance < nearest
         nearest = np.where(closer, distance, nearest)
-        points = np.array(scene["eye"]) + distance[closer][:, None] * unit[closer]
-        colours[closer] = shade(points, (points - centre) / radius, material[0:3], scene["lights"])
+        points = eye + distance[closer][:, None] * unit[closer]
+        normals = normals_of(kind, shape, points, unit[closer])
+        colours[closer] = shade(points, normals, material[0:3], scene["lights"])
     return np.floor(255 * np.clip(colours, 0, 1) + 0.5).astype(np.uint8)
 
 
 def read(path: Path) -> dict:
     scene = {
         "background": [0, 0, 0], "eye": [0, 0, 0], "fov": [60], "uvw": [1, 0, 0, 0, 1, 0, 0, 0, 1],
-        "lights": [], "spheres": [],
+        "lights": [], "shapes": [],
     }  # fmt: skip
-    material = None
+    material, corners = None, []
     for line in path.read_text().splitlines():
         command, *words = line.partition("#")[0].split() or [""]
         if command in ("background", "eye", "fov", "uvw"):
@@ -42,7 +44,12 @@ def read(path: Path) -> dict:
             material = [float(word) for word in words]
         elif command == "sphere":
             radius, *centre = (float(word) for word in words)
-            scene["spheres"].append((centre, radius, material))
+            scene["shapes"].append(("sphere", np.array(centre), radius, material))
+        elif command == "vertex":
+            corners.append([float(word) for word in words])
+        elif command == "end":
+            scene["shapes"].append(("triangle", np.array(corners), material))
+            corners = []
     return scene
 
 
@@ -71,6 +78,30 @@ def sphere_distance(eye: np.ndarray, unit: np.ndarray, centre: np.ndarray, radiu
     near, far = along - half_chord, along + half_chord
     distance = np.where(near > 0, near, far)
     return np.where((half_chord2 >= 0) & (distance > 0), distance, np.inf)
+
+
+def triangle_distance(eye: np.ndarray, unit: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """Where unit rays meet a triangle, by barycentric coordinates; inf for a miss."""
+    edge, other = corners[1] - corners[0], corners[2] - corners[0]
+    across = np.cross(unit, other)
+    determinant = across @ edge
+    from_corner = eye - corners[0]
+    beside = np.cross(from_corner, edge)
+    with np.errstate(all="ignore"):
+        u, v = across @ from_corner / determinant, (unit * beside).sum(axis=-1) / determinant
+        distance = (beside * other).sum(axis=-1) / determinant
+    tiny = -1e-14
+    return np.where((u >= tiny) & (v >= tiny) & (u + v <= 1 - tiny) & (distance > 0), distance, np.inf)
+
+
+def normals_of(kind: str, shape: list, points: np.ndarray, unit: np.ndarray) -> np.ndarray:
+    """A sphere's outwards, a triangle's towards the viewer."""
+    if kind == "sphere":
+        return (points - shape[0]) / shape[1]
+    corners = shape[0]
+    normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+    normal /= np.linalg.norm(normal)
+    return np.where((unit @ normal)[:, None] > 0, -normal, normal)
 
 
 def shade(points: np.ndarray, normals: np.ndarray, colour: list, lights: list) -> np.ndarray:

@@ -41,12 +41,6 @@ def test_render_writes_what_render_scene_draws(tmp_path):
     np.testing.assert_array_equal(load_png(out), render_scene(interpreter(SCENE), "normal", 64, 48, sampling="centre"))
 
 
-def test_triangles_that_are_not_drawn_are_told_of(tmp_path):
-    done = run("render", "scenes/05_one_triangle.cli", "-o", tmp_path / "out.png", "--size", "8")
-    assert done.returncode == 0
-    assert done.stderr == "scenes/05_one_triangle.cli: 1 triangle not drawn: only spheres are, so far\n"
-
-
 def test_check_prints_a_line_for_each_error(tmp_path):
     bad = tmp_path / "bad.cli"
     bad.write_text("eye 0 0 0\nspere 1 0 0 0\n")

@@ -23,7 +23,7 @@ class Scene:
         self.back = mpmath.mpf(naive.focal_length(said["fov"][0]))
         self.lights = [(vector(position), vector(colour)) for position, colour in said["lights"]]
         self.spheres = [
-            (vector(centre), mpmath.mpf(radius), vector(material[:3])) for centre, radius, material in said["spheres"]
+            (vector(centre), mpmath.mpf(radius), vector(material[:3])) for _, centre, radius, material in said["shapes"]
         ]
 
     def bytes(self, x, y):

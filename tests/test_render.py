@@ -148,9 +148,7 @@ def test_the_plan_gives_its_reasons(monkeypatch):
     assert "1 sphere of 2 cannot be seen" in " | ".join(plan.why)
     assert len(plan.lights) == 1
     assert not plan.warnings
-    assert make_plan(interpreter("scenes/05_one_triangle.cli")).warnings == (
-        "1 triangle not drawn: only spheres are, so far",
-    )
+    assert "21 shapes:" in " | ".join(make_plan(interpreter("scenes/06_icosahedron_and_sphere.cli")).why)
     monkeypatch.setattr(backend, "why_no_compiler", lambda: "numba is not installed")
     assert "numpy draws the same picture, slowly" in make_plan(ONE).warnings[0]
 

@@ -3,13 +3,14 @@
 from raytracer.kernels.compiler import cache_named_after_sources
 
 with cache_named_after_sources():
-    from raytracer.kernels.bounds import TILE_HEIGHT, TILE_WIDTH, begin, bound, fill
+    from raytracer.kernels.bounds import TILE_HEIGHT, TILE_WIDTH, begin, bound, count, fill
     from raytracer.kernels.bvh import along_curve, build, candidates_in_tree, nearest_in_tree
     from raytracer.kernels.reading import read_plain
     from raytracer.kernels.tiles import (
         find_fine_hits,
         find_hits,
         paint_diffuse,
+        paint_diffuse_any,
         paint_diffuse_unchecked,
         paint_flat,
         paint_normal,
@@ -29,6 +30,7 @@ __all__ = [
     "build",
     "candidates",
     "candidates_in_tree",
+    "count",
     "fill",
     "find_fine_hits",
     "find_hits",
@@ -37,6 +39,7 @@ __all__ = [
     "nearest_twofold",
     "paint_depth",
     "paint_diffuse",
+    "paint_diffuse_any",
     "paint_diffuse_unchecked",
     "paint_edges",
     "paint_flat",

@@ -45,6 +45,12 @@ def bound(lens, eye, reach, kappa, balls, first, last, boxes, counts, columns):
     return slow
 
 
+@borrowing
+def count(boxes, first, last, counts, columns):
+    """Count the tiles of the boxes first to last − 1."""
+    _count(boxes, np.uint64(first), np.uint64(last), counts, columns)
+
+
 @inlined
 def _count(boxes, first, last, counts, columns):
     """Count the tiles of some boxes; returns how many of them are slow."""

@@ -227,6 +227,17 @@ def largest_of(typing, places):
 
 
 @intrinsic
+def at_least(typing, places, number):
+    """Where a place is not below a number."""
+
+    def lower(context, builder, sig, args):
+        number = builder.trunc(args[1], _INT32)
+        return builder.icmp_signed(">=", args[0], _spread(builder, number))
+
+    return MASK(places, types.int64), lower
+
+
+@intrinsic
 def is_hit(typing, places):
     """Where a place is not negative."""
 

@@ -15,6 +15,7 @@ from raytracer.kernels.compiler import borrowing, inlined, variant
 from raytracer.kernels.lanes import (
     WIDTH,
     any_of,
+    at_least,
     first_of,
     gather,
     gather_rows,
@@ -27,7 +28,7 @@ from raytracer.kernels.lanes import (
     store,
 )
 from raytracer.kernels.visibility import STRIDE, list_doubts, see_tile, see_tile_unchecked
-from raytracer.shading import cosine, land, to_byte, towards
+from raytracer.shading import cosine, land, land_on_any, to_byte, towards
 from raytracer.twofold import select
 
 
@@ -105,7 +106,7 @@ def _shaded_tile(view, scratch, tile, paints, out):
                 put_lanes(out, row, x, tile.right, *background, scratch)
                 continue
             where = select(hit, index, spread(largest_of(index)))
-            p, n, radius = _surface(view, line, load(scratch.k, place), x, where)
+            p, n, radius = surface(view, line, load(scratch.k, place), x, where)
             red, green, blue = shade(view, paints, p, n, radius, where)
             red, green, blue = _over(background, hit, red, green, blue)
             put_lanes(out, row, x, tile.right, red, green, blue, scratch)
@@ -144,14 +145,27 @@ def _line(view, row):
 
 
 @inlined
-def _surface(view, line, k, x, where):
+def _surface_of_spheres(view, line, k, x, where):
     """The hit points as seen from the eye and from their spheres' centres, and the radii."""
-    across, (a1, a0, dx, dy, dz), u, eye = load(view.across, x), line, view.u, view.eye
-    t = k / ((across * view.a2 + a1) * across + a0)
-    cx, cy, cz, radius = _ball(view, where)
-    direction = across * u[0] + dx, across * u[1] + dy, across * u[2] + dz
+    t, direction = _ray(view, line, k, x)
+    (cx, cy, cz, radius), eye = _ball(view, where), view.eye
     p, n = land(t, direction, (eye[0] - cx, eye[1] - cy, eye[2] - cz), radius)
     return p, n, radius
+
+
+@inlined
+def _surface_of_any(view, line, k, x, where):
+    """The same of spheres and triangles."""
+    t, direction = _ray(view, line, k, x)
+    return land_on_any(t, direction, view.eye, _ball(view, where), at_least(where, view.first_facet))
+
+
+@inlined
+def _ray(view, line, k, x):
+    """t, and D."""
+    across, (a1, a0, dx, dy, dz), u = load(view.across, x), line, view.u
+    t = k / ((across * view.a2 + a1) * across + a0)
+    return t, (across * u[0] + dx, across * u[1] + dy, across * u[2] + dz)
 
 
 @inlined
@@ -225,6 +239,7 @@ def _fine_hits_tile(view, scratch, tile, fine, out):
             dy = fine_direction(across, low, u[1], fine.y[r], fine.y_low[r])
             dz = fine_direction(across, low, u[2], fine.z[r], fine.z_low[r])
             finer, sure = refine(t, dx, dy, dz, eye[0], eye[1], eye[2], cx, cy, cz, radius)
+            sure = sure & ~at_least(index, view.first_facet)
             t = select(hit, select(sure, finer, np.nan), np.inf)
             _put_hits(out, at, tile.right - x, t, place, scratch)
 
@@ -237,12 +252,16 @@ def _no_hits_tile(scratch, tile, paints, out):
             out.t[x], out.index[x] = np.inf, -1
 
 
-_diffuse_tile = variant(_shaded_tile, "_diffuse_tile", shade=_diffuse)
-_normal_tile = variant(_shaded_tile, "_normal_tile", shade=_normal)
+_diffuse_tile = variant(_shaded_tile, "_diffuse_tile", shade=_diffuse, surface=_surface_of_spheres)
+_diffuse_any_tile = variant(_shaded_tile, "_diffuse_any_tile", shade=_diffuse, surface=_surface_of_any)
+_normal_tile = variant(_shaded_tile, "_normal_tile", shade=_normal, surface=_surface_of_any)
 paint_flat = variant(_paint, "paint_flat", paint_tile=_flat_tile, fill_tile=_fill_tile, see=see_tile)
 paint_diffuse = variant(_paint, "paint_diffuse", paint_tile=_diffuse_tile, fill_tile=_fill_tile, see=see_tile)
 paint_diffuse_unchecked = variant(
     _paint, "paint_diffuse_unchecked", paint_tile=_diffuse_tile, fill_tile=_fill_tile, see=see_tile_unchecked
+)
+paint_diffuse_any = variant(
+    _paint, "paint_diffuse_any", paint_tile=_diffuse_any_tile, fill_tile=_fill_tile, see=see_tile
 )
 paint_normal = variant(_paint, "paint_normal", paint_tile=_normal_tile, fill_tile=_fill_tile, see=see_tile)
 find_hits = variant(_paint, "find_hits", paint_tile=_hits_tile, fill_tile=_no_hits_tile, see=see_tile)

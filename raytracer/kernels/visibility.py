@@ -14,11 +14,23 @@ A vector holds eight pixels of a row, or four of one and four of the next: of bo
 
 import numpy as np
 
-from raytracer.certified import K_ERROR, approach, arrive, edge_of, inner, meet, side_of
+from raytracer.arrays import FACET
+from raytracer.certified import (
+    K_ERROR,
+    approach,
+    approach_facet,
+    arrive,
+    beside_edges,
+    edge_of,
+    inner,
+    meet,
+    side_of,
+)
 from raytracer.kernels.bounds import TILE_HEIGHT, TILE_WIDTH
 from raytracer.kernels.compiler import borrowing, compiled, inlined, variant
 from raytracer.kernels.lanes import (
     WIDTH,
+    all_of,
     any_of,
     bits_of,
     blend,
@@ -46,11 +58,13 @@ def _see(view, slow, bins, tile, scratch):
     doubts = False
     for i in range(len(slow.ids)):
         doubts |= _draw_slow(view, slow, i, tile, scratch)
-    end = bins.starts[tile.number + 1]
+    end = bins.middles[tile.number]
     for first in range(bins.starts[tile.number], end, WIDTH):
         _look_at_eight(view, bins, first, scratch)
         for j in range(np.uint64(0), np.uint64(min(WIDTH, end - first))):
             doubts |= _draw(draw_row, draw_pair, view, bins, np.uint64(first) + j, j, tile, scratch)
+    for place in range(end, bins.starts[tile.number + 1]):
+        doubts |= _draw_facet(view, bins.entries[place], tile, scratch)
     return doubts
 
 
@@ -149,6 +163,39 @@ def _keep(scratch, p, wins, k, best, i):
     """Put what wins into the depth buffer."""
     store(scratch.k, p, blend(wins, k, best))
     store(scratch.index, p, blend(wins, spread(i), load(scratch.index, p)))
+
+
+@borrowing
+def _draw_facet(view, entry, tile, scratch):
+    """A triangle in its box. Returns whether there are doubts."""
+    i, (start, stop, high, low) = np.int32(_sphere(entry)), _corners(entry)
+    f, at, doubts = view.facets, np.uint64(FACET) * (np.uint64(i) - np.uint64(view.first_facet)), False
+    for line in range(high, low):
+        row = np.uint64(tile.top + line)
+        up, a1, a0 = view.up[row], view.a1[row], view.a0[row]
+        x, p, end = np.uint64(tile.left + start), np.uint64(line * STRIDE + start), np.uint64(line * STRIDE + stop)
+        while p < end:
+            across = load(view.across, x)
+            least, beside = beside_edges(
+                _linear(f, at, across, up), _linear(f, at + np.uint64(3), across, up),
+                _linear(f, at + np.uint64(6), across, up),
+            )  # fmt: skip
+            if not all_of(beside):
+                best, slope = load(scratch.k, p), _linear(f, at + np.uint64(9), across, up)
+                a = (across * view.a2 + a1) * across + a0
+                k, wins, doubt = approach_facet(least, slope, f[at + np.uint64(12)], a, best)
+                _keep(scratch, p, wins, k, best, i)
+                if any_of(doubt):
+                    _note(scratch.doubt, p, bits_of(doubt))
+                    doubts = True
+            x += np.uint64(WIDTH)
+            p += np.uint64(WIDTH)
+    return doubts
+
+
+@inlined
+def _linear(f, at, across, up):
+    return across * f[at] + (up * f[at + np.uint64(1)] + f[at + np.uint64(2)])
 
 
 @borrowing
