@@ -190,7 +190,7 @@ FACET = 16  # numbers a triangle, of which some are to spare
 
 
 class View(NamedTuple):
-    """A picture's rays and its spheres, for the kernels; beyond its columns are eight to spare, beyond its rows is one."""
+    """A picture's rays and its shapes, for the kernels; there are eight columns and one row to spare."""
 
     across: np.ndarray  # the fields of Grid
     up: np.ndarray
@@ -258,6 +258,24 @@ class Paints(NamedTuple):
     flat: np.ndarray  # float64 (3,), likewise: the one colour of a stage that has but one
     lights: np.ndarray  # float64 (n, 6): the place as seen from the eye, the colour
     colours: np.ndarray  # float64, flat: red, green, blue, 0 of each material
+
+
+class FullPaints(NamedTuple):
+    """What the stage `full` is painted with."""
+
+    background: np.ndarray  # float64 (3,), from 0 to 255
+    behind: tuple[float, float, float]  # the background's colour
+    lights: np.ndarray  # float64 (n, 6): the place as seen from the eye, the colour
+    surfaces: np.ndarray  # float64, flat: see `full.surfaces_of`
+    corners: np.ndarray  # float64, flat: see `full.corners_of`
+    starts: np.ndarray  # int64, flat: for each light where the lists of its cells begin, see `cells`
+    ids: np.ndarray  # int32: the lists
+    resolution: int  # cells along an edge
+    spheres: int  # how many there are
+    bits: int  # see `full.Terms`
+    specular: bool
+    shadows: bool
+    mirrors: bool
 
 
 class FineRays(NamedTuple):

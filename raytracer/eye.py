@@ -189,7 +189,7 @@ def _facets(
 
 
 def _not_empty(boxes: np.ndarray) -> np.ndarray:
-    return (boxes[:, 1] > boxes[:, 0]) & (boxes[:, 3] > boxes[:, 2])  # type: ignore[no-any-return]
+    return (boxes[:, 1] > boxes[:, 0]) & (boxes[:, 3] > boxes[:, 2])
 
 
 def usable_spread(raster: Raster) -> float:

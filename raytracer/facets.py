@@ -55,7 +55,7 @@ def _planes(origin: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, np.nda
     nearest = a[np.arange(len(a)), np.argmin(sizes, axis=1)]
     volume, most = _dot(normals, nearest), lengths[:, 0] * lengths[:, 1] * sizes.min(axis=1)
     usual = (sizes > SMALLEST) & (sizes < LARGEST) & (lengths > SMALLEST) & (lengths < LARGEST)
-    known = usual.all(axis=1)
+    known = np.asarray(usual.all(axis=1))
     for i in np.flatnonzero(~(np.abs(volume) > STEEP * most) | ~known).tolist():
         volume[i] = _volume(origin, corners[i])
     facing = -np.sign(volume)[:, None] * _unit_normals(corners)
@@ -75,7 +75,7 @@ def _unit_normals(corners: np.ndarray) -> np.ndarray:
     exponents = np.frexp(np.abs(edges).max(axis=2))[1]
     first, second = np.moveaxis(np.ldexp(edges, -exponents[:, :, None]), 1, 0)
     normals = np.cross(first, second)
-    return normals / _length(normals)[:, None]  # type: ignore[no-any-return]
+    return normals / _length(normals)[:, None]
 
 
 def certain_misses(origins: np.ndarray, rays: TwofoldRays, corners: np.ndarray) -> np.ndarray:
@@ -83,7 +83,7 @@ def certain_misses(origins: np.ndarray, rays: TwofoldRays, corners: np.ndarray) 
     a, edges = corners - origins[:, None], corners[:, _NEXT] - corners
     size = _length(a) * _length(edges) * rays.reach[:, None]
     side = _dot(np.cross(a, edges), np.stack(rays[:3], axis=-1)[:, None])
-    return (side > FACET_ERROR * size).any(axis=1) & (side < -FACET_ERROR * size).any(axis=1)  # type: ignore[no-any-return]
+    return (side > FACET_ERROR * size).any(axis=1) & (side < -FACET_ERROR * size).any(axis=1)
 
 
 def fine_distance(origins: np.ndarray, rays: TwofoldRays, corners: np.ndarray) -> np.ndarray:
@@ -92,7 +92,7 @@ def fine_distance(origins: np.ndarray, rays: TwofoldRays, corners: np.ndarray) -
     normal = _fine_cross(_difference(second, first), _difference(third, second))
     x, y, z, x_low, y_low, z_low, _ = rays
     over = _fine_dot(normal, _difference(first, origins))
-    return divide(*over, *_fine_dot(normal, ((x, x_low), (y, y_low), (z, z_low))))[0]  # type: ignore[no-any-return]
+    return divide(*over, *_fine_dot(normal, ((x, x_low), (y, y_low), (z, z_low))))[0]
 
 
 def _difference(a: np.ndarray, b: np.ndarray) -> TwofoldVector:
@@ -126,8 +126,8 @@ def _volume(origin: np.ndarray, corners: np.ndarray) -> float:
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     product = a * b
-    return product[..., 0] + product[..., 1] + product[..., 2]  # type: ignore[no-any-return]
+    return product[..., 0] + product[..., 1] + product[..., 2]
 
 
 def _length(vectors: np.ndarray) -> np.ndarray:
-    return np.sqrt(_dot(vectors, vectors))  # type: ignore[no-any-return]
+    return np.sqrt(_dot(vectors, vectors))

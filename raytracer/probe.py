@@ -43,13 +43,15 @@ class Figure:
 
 @dataclass(frozen=True)
 class Meeting:
-    """A ray and one of the shapes near it, for a triangle without figures. t and true_t are +inf where the method, or the truth, sees no hit.
+    """A ray and one of the shapes near it, for a triangle without figures.
+
+    t and true_t are +inf where the method, or the truth, sees no hit.
 
     For `certified`, t is what float64 makes of it, and NaN where that is not certain.
     """
 
     index: int  # the shape's place among all shapes of the file
-    shape: Sphere
+    shape: Shape
     figures: tuple[Figure, ...]
     t: float
     true_t: float

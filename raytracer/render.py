@@ -13,14 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from raytracer import backend
-from raytracer.arrays import Hits
+from raytracer.arrays import FullPaints, Hits, Paints
 from raytracer.eye import Eye, count_tests
 from raytracer.image import to_bytes
 from raytracer.methods import CERTIFIED
 from raytracer.plan import Plan, make_plan
 from raytracer.pool import share
 from raytracer.scene import Camera, Light, Materials, Scene, Spheres
-from raytracer.screen import SPARE, Pixels, Screen, make_canvas, make_paints, open_screen
+from raytracer.screen import SPARE, Pixels, Screen, make_canvas, make_full_paints, make_paints, open_screen
 from raytracer.stages import Block, Whole
 
 _GREY = Materials(np.full((1, 11), 0.5))
@@ -126,11 +126,22 @@ def share_bands(tracer: Eye | Screen, plan: Plan, watch: Watch, work: Callable[[
 
 def _paint(plan: Plan, screen: Screen, picture: np.ndarray, watch: Watch) -> None:
     """A stage that a kernel paints; numpy paints the pixels that float64 was not certain of."""
-    paints, canvas = make_paints(plan, screen), make_canvas(picture)
+    paints: Paints | FullPaints = make_paints(plan, screen)
+    if plan.stage.throws_on:
+        paints = make_full_paints(plan, screen)
+    canvas = make_canvas(picture)
     assert canvas is not None
 
     def decide(doubtful: Pixels) -> None:
-        hits = screen.in_scene(doubtful.hits())
+        hits = doubtful.hits()
+        if isinstance(paints, FullPaints):
+            picture[doubtful.ys, doubtful.xs] = paints.background
+            some = hits.index >= 0
+            pixels = doubtful._replace(xs=doubtful.xs[some], ys=doubtful.ys[some])
+            colours = screen.radiance(pixels, Hits(hits.t[some], hits.index[some]), paints)
+            picture[pixels.ys, pixels.xs] = to_bytes(colours)
+            return
+        hits = screen.in_scene(hits)
         block = Block(plan.scene, plan.raster, doubtful.ys, hits, plan.lights, doubtful.xs)
         picture[doubtful.ys, doubtful.xs] = _colours(plan, block)
 

@@ -30,6 +30,7 @@ from raytracer.arrays import (
     Canvas,
     Facets,
     FineRays,
+    FullPaints,
     HitRows,
     Hits,
     Paints,
@@ -42,11 +43,13 @@ from raytracer.arrays import (
 )
 from raytracer.boxes import Lens, facet_boxes, make_lens
 from raytracer.camera import Raster, eye_grid, fine_columns, fine_rows
+from raytracer.cells import light_cells, resolution_for
 from raytracer.eye import bundle_of, usable_spread
 from raytracer.facets import see_facets
+from raytracer.full import corners_of, surfaces_of, terms_of
 from raytracer.plan import Plan
 from raytracer.pool import cores, share
-from raytracer.scene import Colour, Materials, Scene, Spheres
+from raytracer.scene import Colour, Materials, Scene
 from raytracer.settle import Bundle, Index, Targets, known_in_integers, polish, settled
 from raytracer.shading import to_byte
 from raytracer.stages import light_from_eye
@@ -198,7 +201,7 @@ class Screen(NamedTuple):
         return self.targets.path
 
     def paint(
-        self, painter: str, rows: slice, worker: int, paints: Paints | FineRays, out: Canvas | HitRows
+        self, painter: str, rows: slice, worker: int, paints: Paints | FullPaints | FineRays, out: Canvas | HitRows
     ) -> Iterator[Pixels]:
         """Paint these rows, cut between tiles, by a kernel; yields doubtful pixels when there is no room for more.
 
@@ -209,6 +212,17 @@ class Screen(NamedTuple):
         tile, last = rows.start // height * columns, -(-rows.stop // height) * columns
         while (tile := kernel(self.view, self.slow, self.bins, tile, last, scratch, doubts, paints, out)) < last:
             yield from self.doubtful(worker)
+
+    def radiance(self, pixels: Pixels, hits: Hits, paints: FullPaints) -> np.ndarray:
+        """The colours of the stage `full` for some pixels that hit something: float64 (n, 3)."""
+        count = len(pixels.xs)
+        eights = [np.resize(array, -(-count // SPARE) * SPARE) for array in (*hits, pixels.xs, pixels.ys)]
+        t, index, columns, rows = eights
+        colours = np.empty((len(t), 3))
+        self.kernels.radiance_of(
+            self.view, paints, t, index, columns.astype(np.int32), rows.astype(np.int32), self.desks[0].scratch, colours
+        )
+        return colours[:count]
 
     def doubtful(self, *workers: int) -> Iterator[Pixels]:
         """The doubtful pixels that these workers have listed, all together, if there are any."""
@@ -260,8 +274,8 @@ def open_screen(scene: Scene, raster: Raster, kernels: ModuleType, threads: int 
         slow, targets = _slow(lens, view, origin, balls, slow_ids, kernels)
         targets = targets._replace(corners=corners, order=order)
         desks = [_desk(workspace, kernels, worker) for worker in range(threads or cores())]
-        order = order if len(corners) and len(balls) else None
-        yield Screen(raster, unit, origin, len(scene.spheres), order, view, slow, bins, targets, workspace, desks)
+        places = order if len(corners) and len(balls) else None
+        yield Screen(raster, unit, origin, len(scene.spheres), places, view, slow, bins, targets, workspace, desks)
 
 
 @lru_cache(maxsize=64)
@@ -280,6 +294,27 @@ def make_paints(plan: Plan, screen: Screen) -> Paints:
     )  # fmt: skip
 
 
+def make_full_paints(plan: Plan, screen: Screen) -> FullPaints:
+    """What the stage `full` is painted with."""
+    scene, paints = plan.scene, make_paints(plan, screen)
+    terms, (_, _, balls, corners) = terms_of(scene, plan.lights), scene_units(scene)
+    cells = [
+        light_cells(
+            scene.spheres, scene.triangles, balls, corners, np.ldexp(light.position, -screen.unit), screen.kernels
+        )
+        for light in (plan.lights if terms.shadows else ())
+    ]
+    ends = np.cumsum([0, *(len(ids) for _, ids in cells)])
+    starts = [starts + end for (starts, _), end in zip(cells, ends[:-1], strict=True)]
+    return FullPaints(
+        paints.background, scene.background, paints.lights, surfaces_of(scene).reshape(-1),
+        corners_of(screen.origin, corners).reshape(-1), np.concatenate([*starts, _NO_STARTS]),
+        np.concatenate([*(ids for _, ids in cells), _NO_IDS]), resolution_for(len(balls) + len(corners)),
+        len(scene.spheres), terms.bits, terms.specular, terms.shadows, terms.mirrors,
+    )  # fmt: skip
+
+
+_NO_STARTS, _NO_IDS = np.empty(0, np.int64), np.empty(0, np.int32)
 _NO_PAINTS = Paints(np.zeros(3), np.zeros(3), np.empty((0, 6)), Materials().diffuse.reshape(-1))
 
 

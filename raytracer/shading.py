@@ -53,6 +53,23 @@ def cosine(facing: Number, square: Number, radius: Number) -> Number:
     return select(facing > 0.0, facing / (radius * np.sqrt(square)), 0.0)
 
 
+def highlight(p: Three, n: Three, radius: Number, light: Three, square: Number, ray: Three) -> Number:
+    """max(0, H·N) for H halfway between the light, whose T·T is `square`, and where the unit ray came from."""
+    over = 1.0 / np.sqrt(square)
+    x, y, z = (light[0] - p[0]) * over - ray[0], (light[1] - p[1]) * over - ray[1], (light[2] - p[2]) * over - ray[2]
+    return cosine(n[0] * x + n[1] * y + n[2] * z, x * x + y * y + z * z, radius)
+
+
+def raised_to_whole(x: Number, power: Number, bits: int) -> Number:
+    """x to a whole power from 0 to 2**bits − 1, by squaring: the same bits everywhere, as no library's power is."""
+    result = 0.0 * power + 1.0
+    for _ in range(bits):
+        half = np.floor(power * 0.5)
+        result = select(power - (half + half) > 0.0, result * x, result)
+        x, power = x * x, half
+    return result
+
+
 def grey_of(t: Number, near: float, far: float) -> Number:
     """Linear in 1 / t: 1 where t = near, and darker up to t = far."""
     if near < far:

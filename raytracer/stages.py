@@ -16,6 +16,7 @@ from raytracer import shading
 from raytracer.arrays import Hits
 from raytracer.camera import Raster, Vectors, directions, directions_of, eye_grid
 from raytracer.facets import planes_of
+from raytracer.full import World
 from raytracer.scene import Camera, Colour, Light, Scene
 from raytracer.units import scene_units
 
@@ -55,7 +56,7 @@ class Block:
         if not len(self.scene.triangles):
             return np.zeros(len(shape), bool)
         place = np.searchsorted(spheres, shape)
-        return np.append(spheres, -1)[place] != shape  # type: ignore[no-any-return]
+        return np.append(spheres, -1)[place] != shape
 
     @cached_property
     def _number(self) -> np.ndarray:
@@ -91,7 +92,7 @@ class Block:
 
     @cached_property
     def _rows(self) -> np.ndarray:
-        """What is hit, in units: a sphere's centre and radius, or a triangle's plane as seen from the eye: (hits, 4)."""
+        """What is hit, in units: a sphere's centre and radius, or a triangle's plane: (hits, 4)."""
         _, eye, balls, corners = self._units
         if not self._flat.any():
             return balls[self._number]
@@ -101,11 +102,29 @@ class Block:
         return rows
 
     @cached_property
+    def _t(self) -> np.ndarray:
+        """t of the hits, in units: (hits,)."""
+        return np.ldexp(self.hits.t[self.hit], -self._unit)
+
+    @cached_property
+    def _where(self) -> np.ndarray:
+        """Which shape is hit, as `World` numbers them: (hits,)."""
+        first = len(self.scene.spheres.balls)
+        return np.where(self._flat, first + self._number, self._number).astype(np.int32)
+
+    @cached_property
+    def _world(self) -> World:
+        places = [light_from_eye(light, self.scene.camera, self._unit).tolist() for light in self.lights]
+        lights = tuple((tuple(p), light.colour) for p, light in zip(places, self.lights, strict=True))
+        return World(self.scene, lights)
+
+    @cached_property
     def _landed(self) -> tuple[shading.Three, shading.Three, np.ndarray]:
         """P, from the eye to the hit points, and r·N, and r, in units: arrays (hits,)."""
         x, y, z = (component[self.hit] for component in self._directions)
-        row, t = self._rows.T, np.ldexp(self.hits.t[self.hit], -self._unit)
-        return shading.land_on_any(t, (x, y, z), self._units[1], (row[0], row[1], row[2], row[3]), self._flat)
+        a, b, c, d = self._rows.T
+        ex, ey, ez = self._units[1]
+        return shading.land_on_any(self._t, (x, y, z), (ex, ey, ez), (a, b, c, d), self._flat)
 
     @property
     def _from_eye(self) -> shading.Three:
@@ -207,6 +226,14 @@ def diffuse(block: Block) -> np.ndarray:
     for light in block.lights:
         total += np.multiply.outer(block.cosine(light), light.colour)
     return block.paint(total * block.diffuse, elsewhere=block.scene.background)
+
+
+def full(block: Block) -> np.ndarray:
+    """C = ambient + k_refl · C of the mirrored ray + Σ over unshadowed lights of light · (diffuse · max(0, N·L) +
+    specular · max(0, H·N)^power)"""
+    x, y, z = (component[block.hit] for component in block._directions)
+    colours = block._world.radiance(block._t, (x, y, z), block._where)
+    return block.paint(colours, elsewhere=block.scene.background)
 
 
 def normal(block: Block) -> np.ndarray:
@@ -314,6 +341,7 @@ class Stage:
     needs_hits: bool = True
     needs_normals: bool = False
     needs_lights: bool = False
+    throws_on: bool = False  # follows light beyond the eye ray's hit: towards the lights, and off mirrors
     needs_whole: bool = False  # looks at the hits of other rows than its own
     needs_truth: bool = False  # compares the method's hits with the true ones
     needs_tests: bool = False  # counts how many spheres a pixel is tested against
@@ -333,6 +361,10 @@ STAGES = {
     "diffuse": Stage(
         "d", diffuse, "the light that a matt surface throws back", needs_normals=True, needs_lights=True,
         painter="paint_diffuse",
+    ),
+    "full": Stage(
+        "f", full, "all light: ambient, diffuse, specular, with shadows and mirrors", needs_normals=True,
+        needs_lights=True, throws_on=True, painter="paint_full",
     ),
     "normal": Stage(
         "n", normal, "the normal (x, y, z) as red, green, blue: −1 is 0, 1 is full", needs_normals=True,

@@ -5,6 +5,7 @@ from raytracer.kernels.compiler import cache_named_after_sources
 with cache_named_after_sources():
     from raytracer.kernels.bounds import TILE_HEIGHT, TILE_WIDTH, begin, bound, count, fill
     from raytracer.kernels.bvh import along_curve, build, candidates_in_tree, nearest_in_tree
+    from raytracer.kernels.full import CORNERS, radiance_of, sort_into_cells
     from raytracer.kernels.reading import read_plain
     from raytracer.kernels.tiles import (
         find_fine_hits,
@@ -13,6 +14,7 @@ with cache_named_after_sources():
         paint_diffuse_any,
         paint_diffuse_unchecked,
         paint_flat,
+        paint_full,
         paint_normal,
     )
     from raytracer.kernels.trace import nearest_given, nearest_twofold, polish, refine_given
@@ -21,6 +23,7 @@ with cache_named_after_sources():
     from raytracer.kernels.whole import paint_depth, paint_edges, range_of
 
 __all__ = [
+    "CORNERS",
     "STRIDE",
     "TILE_HEIGHT",
     "TILE_WIDTH",
@@ -43,11 +46,14 @@ __all__ = [
     "paint_diffuse_unchecked",
     "paint_edges",
     "paint_flat",
+    "paint_full",
     "paint_normal",
     "polish",
+    "radiance_of",
     "range_of",
     "read_plain",
     "refine_given",
+    "sort_into_cells",
     "usual_eye",
     "usual_given",
 ]

@@ -24,7 +24,7 @@ import numba
 from llvmlite.binding import get_host_cpu_features
 from numba.extending import overload, register_jitable
 
-from raytracer import boxes, certified, methods, shading, twofold
+from raytracer import bounce, boxes, certified, methods, shading, twofold
 from raytracer.kernels.lanes import Mask, blend, fused
 
 
@@ -64,7 +64,7 @@ def _compile_calls_into(module: ModuleType) -> None:
             register_jitable(function)
 
 
-_SOURCES = (twofold, certified, boxes, shading, methods)
+_SOURCES = (twofold, certified, boxes, shading, bounce, methods)
 _OVERLOADED = (twofold.select, twofold.exponent, twofold.scale)
 if get_host_cpu_features().get("fma"):
     _OVERLOADED += (twofold.two_product,)

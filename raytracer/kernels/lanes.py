@@ -79,7 +79,7 @@ def _order(numbers):
 
 def _operator(symbol, operand, result, count, lower):
     """Let a symbol take so many operands, of which one at least is a vector and the rest may be single values."""
-    vector, single = type(operand), types.Boolean if operand is MASK else types.Number
+    vector, single = type(operand), types.Number if operand is LANES else types.Boolean
 
     @infer_global(symbol)
     class Operator(AbstractTemplate):
@@ -128,6 +128,8 @@ for _symbol, _sign in (
     (operator.eq, "=="),
 ):
     _operator(_symbol, LANES, MASK, 2, _comparison(_sign))
+_operator(operator.add, PLACES, PLACES, 2, ir.IRBuilder.add)
+_operator(operator.mul, PLACES, PLACES, 2, ir.IRBuilder.mul)
 _operator(operator.and_, MASK, MASK, 2, ir.IRBuilder.and_)
 _operator(operator.or_, MASK, MASK, 2, ir.IRBuilder.or_)
 _operator(operator.invert, MASK, MASK, 1, ir.IRBuilder.not_)
@@ -224,6 +226,51 @@ def largest_of(typing, places):
         return builder.call(get_or_insert_function(builder.module, kind, f"llvm.vector.reduce.smax.v{WIDTH}i32"), args)
 
     return types.int32(places), lower
+
+
+@intrinsic
+def equal_to(typing, places, number):
+    """Where a place is a number."""
+
+    def lower(context, builder, sig, args):
+        return builder.icmp_signed("==", args[0], _spread(builder, builder.trunc(args[1], _INT32)))
+
+    return MASK(places, types.int64), lower
+
+
+@intrinsic
+def first_where(typing, mask, places):
+    """The place in the first lane whose mask is set, if there is any."""
+
+    def lower(context, builder, sig, args):
+        bits = builder.zext(builder.bitcast(args[0], _BYTE), _INT32)
+        lane = builder.cttz(builder.or_(bits, ir.Constant(_INT32, 1 << WIDTH)), ir.Constant(_BIT, 1))
+        lane = builder.and_(lane, ir.Constant(_INT32, WIDTH - 1))
+        return builder.sext(builder.extract_element(args[1], lane), ir.IntType(64))
+
+    return types.int64(mask, places), lower
+
+
+@intrinsic
+def whole(typing, lanes):
+    """Whole numbers as places."""
+    return PLACES(lanes), lambda context, builder, sig, args: builder.fptosi(args[0], ir.VectorType(_INT32, WIDTH))
+
+
+@intrinsic
+def raised(typing, lanes, power):
+    """Each lane to the power that the other has there, one after the other."""
+
+    def lower(context, builder, sig, args):
+        kind, found = ir.FunctionType(_DOUBLE, [_DOUBLE, _DOUBLE]), args[0]
+        function = get_or_insert_function(builder.module, kind, "llvm.pow.f64")
+        for lane in range(WIDTH):
+            where = ir.Constant(_INT32, lane)
+            one = builder.call(function, [builder.extract_element(each, where) for each in args])
+            found = builder.insert_element(found, one, where)
+        return found
+
+    return LANES(lanes, power), lower
 
 
 @intrinsic

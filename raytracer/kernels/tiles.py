@@ -12,6 +12,7 @@ from raytracer.arrays import Tile
 from raytracer.certified import fine_direction, refine
 from raytracer.kernels.bounds import TILE_HEIGHT, TILE_WIDTH
 from raytracer.kernels.compiler import borrowing, inlined, variant
+from raytracer.kernels.full import radiance
 from raytracer.kernels.lanes import (
     WIDTH,
     any_of,
@@ -106,29 +107,29 @@ def _shaded_tile(view, scratch, tile, paints, out):
                 put_lanes(out, row, x, tile.right, *background, scratch)
                 continue
             where = select(hit, index, spread(largest_of(index)))
-            p, n, radius = surface(view, line, load(scratch.k, place), x, where)
-            red, green, blue = shade(view, paints, p, n, radius, where)
-            red, green, blue = _over(background, hit, red, green, blue)
+            t, direction = _ray(view, line, load(scratch.k, place), x)
+            red, green, blue = shade(view, paints, t, direction, where)
+            red, green, blue = _over(background, hit, to_byte(red), to_byte(green), to_byte(blue))
             put_lanes(out, row, x, tile.right, red, green, blue, scratch)
 
 
-@inlined
-def _diffuse(view, paints, p, n, radius, where):
+def _diffuse(view, paints, t, direction, where):
     """`stages.diffuse`."""
+    p, n, radius = surface(view, t, direction, where)
     red, green, blue, light = spread(0.0), spread(0.0), spread(0.0), paints.lights
     for i in range(np.uint64(len(light))):
         facing, square = towards(p, n, (light[i, 0], light[i, 1], light[i, 2]))
         shine = cosine(facing, square, radius)
         red, green, blue = red + light[i, 3] * shine, green + light[i, 4] * shine, blue + light[i, 5] * shine
     r, g, b, _ = _colours(view, paints, where)
-    return to_byte(red * r), to_byte(green * g), to_byte(blue * b)
+    return red * r, green * g, blue * b
 
 
 @inlined
-def _normal(view, paints, p, n, radius, where):
+def _normal(view, paints, t, direction, where):
     """`stages.normal`."""
-    red, green, blue = (n[0] / radius + 1.0) / 2.0, (n[1] / radius + 1.0) / 2.0, (n[2] / radius + 1.0) / 2.0
-    return to_byte(red), to_byte(green), to_byte(blue)
+    _, n, radius = _surface_of_any(view, t, direction, where)
+    return (n[0] / radius + 1.0) / 2.0, (n[1] / radius + 1.0) / 2.0, (n[2] / radius + 1.0) / 2.0
 
 
 @inlined
@@ -145,18 +146,16 @@ def _line(view, row):
 
 
 @inlined
-def _surface_of_spheres(view, line, k, x, where):
+def _surface_of_spheres(view, t, direction, where):
     """The hit points as seen from the eye and from their spheres' centres, and the radii."""
-    t, direction = _ray(view, line, k, x)
     (cx, cy, cz, radius), eye = _ball(view, where), view.eye
     p, n = land(t, direction, (eye[0] - cx, eye[1] - cy, eye[2] - cz), radius)
     return p, n, radius
 
 
 @inlined
-def _surface_of_any(view, line, k, x, where):
+def _surface_of_any(view, t, direction, where):
     """The same of spheres and triangles."""
-    t, direction = _ray(view, line, k, x)
     return land_on_any(t, direction, view.eye, _ball(view, where), at_least(where, view.first_facet))
 
 
@@ -252,9 +251,12 @@ def _no_hits_tile(scratch, tile, paints, out):
             out.t[x], out.index[x] = np.inf, -1
 
 
-_diffuse_tile = variant(_shaded_tile, "_diffuse_tile", shade=_diffuse, surface=_surface_of_spheres)
-_diffuse_any_tile = variant(_shaded_tile, "_diffuse_any_tile", shade=_diffuse, surface=_surface_of_any)
-_normal_tile = variant(_shaded_tile, "_normal_tile", shade=_normal, surface=_surface_of_any)
+_diffuse_of_spheres = variant(_diffuse, "_diffuse_of_spheres", inlined, surface=_surface_of_spheres)
+_diffuse_of_any = variant(_diffuse, "_diffuse_of_any", inlined, surface=_surface_of_any)
+_diffuse_tile = variant(_shaded_tile, "_diffuse_tile", shade=_diffuse_of_spheres)
+_diffuse_any_tile = variant(_shaded_tile, "_diffuse_any_tile", shade=_diffuse_of_any)
+_normal_tile = variant(_shaded_tile, "_normal_tile", shade=_normal)
+_full_tile = variant(_shaded_tile, "_full_tile", shade=radiance)
 paint_flat = variant(_paint, "paint_flat", paint_tile=_flat_tile, fill_tile=_fill_tile, see=see_tile)
 paint_diffuse = variant(_paint, "paint_diffuse", paint_tile=_diffuse_tile, fill_tile=_fill_tile, see=see_tile)
 paint_diffuse_unchecked = variant(
@@ -263,6 +265,7 @@ paint_diffuse_unchecked = variant(
 paint_diffuse_any = variant(
     _paint, "paint_diffuse_any", paint_tile=_diffuse_any_tile, fill_tile=_fill_tile, see=see_tile
 )
+paint_full = variant(_paint, "paint_full", paint_tile=_full_tile, fill_tile=_fill_tile, see=see_tile)
 paint_normal = variant(_paint, "paint_normal", paint_tile=_normal_tile, fill_tile=_fill_tile, see=see_tile)
 find_hits = variant(_paint, "find_hits", paint_tile=_hits_tile, fill_tile=_no_hits_tile, see=see_tile)
 find_fine_hits = variant(_paint, "find_fine_hits", paint_tile=_fine_hits_tile, fill_tile=_no_hits_tile, see=see_tile)

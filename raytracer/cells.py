@@ -1,0 +1,83 @@
+"""Which shapes a light may see in which direction: the directions from it, cut into the cells of a cube.
+
+Each face of the cube is a picture of the shapes as an eye at the light would see it, a cell being a pixel, and the
+boxes of pixels are those of `boxes`, widened from the rays through corners of pixels to all of their area.
+"""
+
+from __future__ import annotations
+
+from types import ModuleType
+
+import numpy as np
+
+from raytracer import plain
+from raytracer.boxes import Lens, facet_boxes, make_lens
+from raytracer.camera import make_raster
+from raytracer.scene import Camera, Spheres, Triangles, Vector
+
+Cells = tuple[np.ndarray, np.ndarray]  # where each cell's list begins, int64; and the numbers of shapes, int32
+
+_MOST = 512  # cells along an edge of the cube
+_KEPT = 16  # lights
+
+_kept: dict[tuple[int, int, Vector], tuple[Spheres, Triangles, Cells]] = {}
+
+
+def resolution_for(shapes: int) -> int:
+    """How many cells an edge of the cube has."""
+    return min(_MOST, 1 << max(0, int(np.ceil(np.log2(2.0 * np.sqrt(max(shapes, 1)))))))
+
+
+def light_cells(
+    spheres: Spheres, triangles: Triangles, balls: np.ndarray, corners: np.ndarray, light: np.ndarray, path: ModuleType
+) -> Cells:
+    """The lists of a light's cube. Kept, for as long as the shapes and the light are the same."""
+    key = id(spheres), id(triangles), (float(light[0]), float(light[1]), float(light[2]))
+    found = _kept.get(key)
+    if found is None:
+        while len(_kept) >= _KEPT:
+            _kept.pop(next(iter(_kept)), None)
+        found = _kept[key] = spheres, triangles, _light_cells(balls, corners, light, path)
+    return found[2]
+
+
+def _light_cells(balls: np.ndarray, corners: np.ndarray, light: np.ndarray, path: ModuleType) -> Cells:
+    size = resolution_for(len(balls) + len(corners))
+    faces = [_face_boxes(balls, corners, light, size, axis, sign) for axis in range(3) for sign in (1.0, -1.0)]
+    starts, ids = path.sort_into_cells(np.stack(faces), size)
+    return starts, ids
+
+
+def _face_boxes(
+    balls: np.ndarray, corners: np.ndarray, light: np.ndarray, size: int, axis: int, sign: float
+) -> np.ndarray:
+    """The boxes of cells of all shapes on one face: int32 (shapes, 4)."""
+    u, v, w = (np.zeros(3) for _ in range(3))
+    u[(axis + 1) % 3], v[(axis + 2) % 3], w[axis] = 1.0, -1.0, -sign
+    camera = Camera((0.0, 0.0, 0.0), _vector(u), _vector(v), _vector(w), 90.0)
+    lens = make_lens(make_raster(camera, size, size))
+    spheres = _widened(plain.bound(lens, light, balls)[0], size)
+    return np.concatenate([spheres, _triangles(lens, light, corners, size)]) if len(corners) else spheres
+
+
+def _triangles(lens: Lens, light: np.ndarray, corners: np.ndarray, size: int) -> np.ndarray:
+    """What both a triangle's corners and a sphere about it allow."""
+    middle = corners.mean(axis=1)
+    reach = np.sqrt(((corners - middle[:, None]) ** 2).sum(axis=2).max(axis=1)) * (1.0 + 1e-9)
+    about = _widened(plain.bound(lens, light, np.column_stack([middle, reach]))[0], size)
+    own = _widened(facet_boxes(lens, corners - light), size)
+    low, high = np.maximum(about, own), np.minimum(about, own)
+    return np.stack([low[:, 0], high[:, 1], low[:, 2], high[:, 3]], axis=-1)
+
+
+def _widened(boxes: np.ndarray, size: int) -> np.ndarray:
+    """From pixels whose corner sees a shape to those of which any part may. Empty boxes between two corners as well."""
+    left, right, top, bottom = boxes.T
+    hidden = (right == 0) & (left == 0) & (top == 0) & (bottom == 0)
+    wide = np.stack([np.maximum(left - 1, 0), right, np.maximum(top - 1, 0), bottom], axis=-1)
+    return np.where(hidden[:, None], 0, wide).astype(np.int32)
+
+
+def _vector(x: np.ndarray) -> Vector:
+    a, b, c = x.tolist()
+    return a, b, c

@@ -1,0 +1,231 @@
+"""Light that has been thrown back once or many times, eight rays at a time: the stage `full`.
+
+    a hit ─ land ─> P, N ─ lights ──────────────> ambient + Σ (diffuse + specular), if nothing blocks the way
+                      └─── mirror ─> next hit ──> the same again, weighed by k_refl
+
+Rays towards one light share an origin too: the light. Seen from there, the directions are cut into the cells of a cube,
+and each cell has the list of shapes that reach into it; a ray is tested against those of its cell (`light_cells`).
+Eight rays stay together however their ways part; those that are done are only not looked at any more.
+"""
+
+import numpy as np
+
+from raytracer.bounce import (
+    MOST_REFLECTIONS,
+    blocks_sphere,
+    land_again,
+    meet_sphere,
+    plane_ahead,
+    reflected,
+    within_edges,
+)
+from raytracer.certified import inner
+from raytracer.kernels.compiler import borrowing, compiled, inlined
+from raytracer.kernels.lanes import (
+    any_of,
+    at_least,
+    equal_to,
+    first_where,
+    gather,
+    gather_rows,
+    is_hit,
+    load,
+    raised,
+    spread,
+    store,
+    whole,
+)
+from raytracer.shading import cosine, highlight, land_on_any, raised_to_whole, towards
+from raytracer.twofold import select
+
+CORNERS = 12  # numbers a triangle: its corners, how far away they are, and some to spare
+
+
+@inlined
+def radiance(view, paints, t, d, where):
+    """The colours that come along eight eye rays D from hits at t on the shapes at these places."""
+    p, n, radius = land_on_any(t, d, view.eye, gather_rows(view.balls, where), at_least(where, view.first_facet))
+    red, green, blue, weight = spread(0.0), spread(0.0), spread(0.0), spread(1.0)
+    background, a = paints.behind, inner(d[0], d[1], d[2], d[0], d[1], d[2])
+    for bounce in range(MOST_REFLECTIONS + 1):
+        material, shown = spread(np.int32(3)) * gather(view.material, where), weight > 0.0
+        ambient = gather_rows(paints.surfaces, material + spread(np.int32(1)))
+        light = _light(view, paints, p, n, radius, d, a, where, shown, material)
+        red = red + select(shown, weight * (ambient[0] + light[0]), 0.0)
+        green = green + select(shown, weight * (ambient[1] + light[1]), 0.0)
+        blue = blue + select(shown, weight * (ambient[2] + light[2]), 0.0)
+        weight = select(shown, weight * ambient[3], 0.0)
+        if bounce == MOST_REFLECTIONS or not paints.mirrors or not any_of(weight > 0.0):
+            break
+        d, facing = reflected(d, n, radius)
+        a = inner(d[0], d[1], d[2], d[0], d[1], d[2])
+        t, found = _nearest(view, paints, p, d, a, where, facing < 0.0)
+        missed = (weight > 0.0) & ~is_hit(found)
+        red = red + select(missed, weight * background[0], 0.0)
+        green = green + select(missed, weight * background[1], 0.0)
+        blue = blue + select(missed, weight * background[2], 0.0)
+        weight = select(missed, 0.0, weight)
+        if not any_of(weight > 0.0):
+            break
+        where = select(is_hit(found), found, where)
+        flat = at_least(where, view.first_facet)
+        p, n, radius = land_again(t, p, d, gather_rows(view.balls, where), view.eye, flat)
+    return red, green, blue
+
+
+@inlined
+def _light(view, paints, p, n, radius, d, a, where, shown, material):
+    """What all lights add, where it is shown."""
+    red, green, blue, spark, lights = spread(0.0), spread(0.0), spread(0.0), spread(0.0), paints.lights
+    dr, dg, db, power = gather_rows(paints.surfaces, material)
+    sr, sg, sb, _ = gather_rows(paints.surfaces, material + spread(np.int32(2)))
+    over, size = 1.0 / np.sqrt(a), abs(p[0]) + abs(p[1]) + abs(p[2])
+    unit = d[0] * over, d[1] * over, d[2] * over
+    for i in range(np.uint64(len(lights))):
+        light = lights[i, 0], lights[i, 1], lights[i, 2]
+        facing, square = towards(p, n, light)
+        shine = cosine(facing, square, radius)
+        if paints.specular:
+            spark = highlight(p, n, radius, light, square, unit)
+            spark = raised_to_whole(spark, power, paints.bits) if paints.bits >= 0 else raised(spark, power)
+        lit = shown & ((shine > 0.0) | (spark > 0.0))
+        if paints.shadows and any_of(lit):
+            lit = lit & ~_blocked(view, paints, i, p, light, square, where, size, lit)
+        if any_of(lit):
+            red = red + select(lit, lights[i, 3] * (dr * shine + sr * spark), 0.0)
+            green = green + select(lit, lights[i, 4] * (dg * shine + sg * spark), 0.0)
+            blue = blue + select(lit, lights[i, 5] * (db * shine + sb * spark), 0.0)
+    return red, green, blue
+
+
+@inlined
+def _blocked(view, paints, i, p, light, a, where, size, asked):
+    """Whether something stands between P and light i, where that is asked."""
+    d = light[0] - p[0], light[1] - p[1], light[2] - p[2]
+    cell, blocked, left = _cell(paints.resolution, d), ~asked, asked
+    first = np.int64(i) * np.int64(6 * paints.resolution * paints.resolution + 1)
+    while any_of(left):
+        chosen = first_where(left, cell)
+        group = left & equal_to(cell, chosen)
+        start, stop = paints.starts[first + chosen], paints.starts[first + chosen + 1]
+        for place in range(start, stop):
+            if not any_of(group & ~blocked):
+                break
+            blocked = blocked | (group & _blocks(view, paints, paints.ids[place], p, d, a, 1.0 / a, where, size))
+        left = left & ~group
+    return blocked & asked
+
+
+@inlined
+def _cell(resolution, d):
+    """The cell of the light's cube that D comes from: 6 faces of rows of cells."""
+    x, y, z = -d[0], -d[1], -d[2]
+    ax, ay, az = abs(x), abs(y), abs(z)
+    of_x, of_y = (ax >= ay) & (ax >= az), ay >= az
+    along = select(of_x, x, select(of_y, y, z))
+    across, down = select(of_x, y, select(of_y, z, x)), select(of_x, z, select(of_y, x, y))
+    face = select(of_x, 0.0, select(of_y, 1.0, 2.0)) * 2.0 + select(along < 0.0, 1.0, 0.0)
+    half, last = resolution * 0.5, resolution - 1.0
+    over = half / abs(along)
+    column, row = np.floor(across * over + half), np.floor(down * over + half)
+    column, row = select(column < last, column, last), select(row < last, row, last)
+    return whole((face * resolution + row) * resolution + column)
+
+
+@inlined
+def _blocks(view, paints, j, p, d, a, over_a, where, size):
+    """Whether shape j stands between P and P + D."""
+    row, own, eye = np.uint64(4) * np.uint64(j), equal_to(where, np.int64(j)), view.eye
+    x, y, z, w = (
+        view.balls[row],
+        view.balls[row + np.uint64(1)],
+        view.balls[row + np.uint64(2)],
+        view.balls[row + np.uint64(3)],
+    )
+    if j < view.first_facet:
+        o = p[0] + (eye[0] - x), p[1] + (eye[1] - y), p[2] + (eye[2] - z)
+        return blocks_sphere(o, d, a, over_a, w, size, own)
+    corners, at = paints.corners, np.uint64(CORNERS) * np.uint64(j - view.first_facet)
+    over, under = plane_ahead(p, d, (x, y, z, w), corners[at + np.uint64(9)], size, own)
+    between = (over > 0.0) & (over < under)
+    if any_of(between):
+        between = between & _within(corners, at, p, d)
+    return between
+
+
+@inlined
+def _within(corners, at, p, d):
+    first = corners[at], corners[at + np.uint64(1)], corners[at + np.uint64(2)]
+    second = corners[at + np.uint64(3)], corners[at + np.uint64(4)], corners[at + np.uint64(5)]
+    third = corners[at + np.uint64(6)], corners[at + np.uint64(7)], corners[at + np.uint64(8)]
+    return within_edges(p, d, first, second, third)
+
+
+@inlined
+def _nearest(view, paints, p, d, a, where, from_outside):
+    """What rays from P on the shapes at these places hit first."""
+    best, index, over_a, size = spread(np.inf), spread(np.int32(-1)), 1.0 / a, abs(p[0]) + abs(p[1]) + abs(p[2])
+    balls, eye, corners = view.balls, view.eye, paints.corners
+    for j in range(np.uint64(paints.spheres)):
+        row, own = np.uint64(4) * j, equal_to(where, np.int64(j))
+        x, y, z, radius = balls[row], balls[row + np.uint64(1)], balls[row + np.uint64(2)], balls[row + np.uint64(3)]
+        o = p[0] + (eye[0] - x), p[1] + (eye[1] - y), p[2] + (eye[2] - z)
+        t = meet_sphere(o, d, a, over_a, radius, size, own, from_outside)
+        index, best = select(t < best, spread(np.int32(j)), index), select(t < best, t, best)
+    for k in range(np.uint64(len(corners) // CORNERS)):
+        j = k + np.uint64(view.first_facet)
+        row, at, own = np.uint64(4) * j, np.uint64(CORNERS) * k, equal_to(where, np.int64(j))
+        plane = balls[row], balls[row + np.uint64(1)], balls[row + np.uint64(2)], balls[row + np.uint64(3)]
+        over, under = plane_ahead(p, d, plane, corners[at + np.uint64(9)], size, own)
+        t = over / under
+        closer = (over > 0.0) & (t < best)
+        if any_of(closer):
+            closer = closer & _within(corners, at, p, d)
+            index, best = select(closer, spread(np.int32(j)), index), select(closer, t, best)
+    return best, index
+
+
+@compiled
+def sort_into_cells(boxes, resolution):
+    """The lists of a cube's cells, from the boxes of cells of all shapes on each face: int32 (6, shapes, 4).
+
+    Returns where each list begins, int64 (cells + 1,), and the numbers of shapes, int32.
+    """
+    faces, shapes, _ = boxes.shape
+    starts = np.zeros(faces * resolution * resolution + 1, np.int64)
+    for face in range(faces):
+        for i in range(shapes):
+            for row in range(boxes[face, i, 2], boxes[face, i, 3]):
+                for column in range(boxes[face, i, 0], boxes[face, i, 1]):
+                    starts[(face * resolution + row) * resolution + column + 1] += 1
+    for cell in range(1, len(starts)):
+        starts[cell] += starts[cell - 1]
+    ids, places = np.empty(starts[-1], np.int32), starts.copy()
+    for face in range(faces):
+        for i in range(shapes):
+            for row in range(boxes[face, i, 2], boxes[face, i, 3]):
+                for column in range(boxes[face, i, 0], boxes[face, i, 1]):
+                    cell = (face * resolution + row) * resolution + column
+                    ids[places[cell]] = i
+                    places[cell] += 1
+    return starts, ids
+
+
+@borrowing
+def radiance_of(view, paints, t, index, columns, rows, scratch, colours):
+    """The colours of single hits, float64 (n, 3): t, index and pixels are arrays of whole eights."""
+    u, v, back = view.u, view.v, view.back
+    for k in range(np.uint64(0), np.uint64(len(t)), np.uint64(8)):
+        across, up = gather(view.across, load(columns, k)), gather(view.up, load(rows, k))
+        d = (
+            across * u[0] + (up * v[0] - back[0]),
+            across * u[1] + (up * v[1] - back[1]),
+            across * u[2] + (up * v[2] - back[2]),
+        )
+        red, green, blue = radiance(view, paints, load(t, k), d, load(index, k))
+        store(scratch.batch, 0, red)
+        store(scratch.batch, 8, green)
+        store(scratch.batch, 16, blue)
+        for lane in range(8):
+            for colour in range(3):
+                colours[k + np.uint64(lane), colour] = scratch.batch[8 * colour + lane]
