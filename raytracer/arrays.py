@@ -248,6 +248,8 @@ class Scratch(NamedTuple):
     index: np.ndarray  # type: ignore[assignment]  # int32
     doubt: np.ndarray  # bool
     batch: np.ndarray  # float64 (40,)
+    stack: np.ndarray  # int64 (STACK,), boxes of a tree
+    near: np.ndarray  # float64 (STACK,), where rays enter them
     rest: np.ndarray  # uint8 (24,)
 
 
@@ -268,10 +270,10 @@ class FullPaints(NamedTuple):
     lights: np.ndarray  # float64 (n, 6): the place as seen from the eye, the colour
     surfaces: np.ndarray  # float64, flat: see `full.surfaces_of`
     corners: np.ndarray  # float64, flat: see `full.corners_of`
-    starts: np.ndarray  # int64, flat: for each light where the lists of its cells begin, see `cells`
+    starts: np.ndarray  # int64, flat: for each light where the lists of its cells begin, see `lookup`
     ids: np.ndarray  # int32: the lists
     resolution: int  # cells along an edge
-    spheres: int  # how many there are
+    tree: Tree  # over all shapes
     bits: int  # see `full.Terms`
     specular: bool
     shadows: bool

@@ -185,6 +185,75 @@ def _hit_triangle(eye: list[int], steps: list[int], a: int, corners: list[int]) 
     return volume * a, 1, 0, first + second + third
 
 
+class SeenSphere(NamedTuple):
+    """A sphere and an origin, in integers."""
+
+    eye: list[int]
+    sphere: list[int]  # centre, radius
+    unit: int  # how many of them make 1
+
+
+class SeenTriangle(NamedTuple):
+    """A triangle as seen from an origin, in integers: what rays from there share."""
+
+    volume: int  # V, not below 0; 0 if the origin lies in its plane, so that no ray meets it
+    sides: tuple[tuple[int, int, int], ...]  # b × c, c × a, a × b, with V's sign
+    unit: int  # how many of them make 1, in length
+
+
+Seen = SeenSphere | SeenTriangle
+
+
+def seen_from(origin: Sequence[float], shape: Sequence[float]) -> Seen:
+    """A shape, centre and radius or three corners, as seen from an origin."""
+    numbers, unit = _integers([*origin, *shape])
+    if len(shape) == 4:
+        return SeenSphere(numbers[:3], numbers[3:], unit)
+    ox, oy, oz, *corners = numbers
+    a, b, c = ((x - ox, y - oy, z - oz) for x, y, z in zip(corners[::3], corners[1::3], corners[2::3], strict=True))
+    sides = _cross(b, c), _cross(c, a), _cross(a, b)
+    volume = a[0] * sides[0][0] + a[1] * sides[0][1] + a[2] * sides[0][2]
+    if volume < 0:
+        volume, sides = -volume, (_negative(sides[0]), _negative(sides[1]), _negative(sides[2]))
+    return SeenTriangle(volume, sides, unit)
+
+
+def nearest_seen(shapes: Sequence[Seen], direction: Sequence[int], unit: int) -> tuple[float, int]:
+    """`nearest_of` for shapes seen from one origin: t and which, of equal t the first."""
+    steps, best = list(direction), None
+    a = _square(steps)
+    for i, shape in enumerate(shapes):
+        found = _seen_triangle(shape, steps) if isinstance(shape, SeenTriangle) else _seen_sphere(shape, steps, a)
+        if found is not None and (best is None or _is_less(found, best)):
+            best, at = found, i
+    return (inf, -1) if best is None else (_nearest_float(best, unit, 1), at)
+
+
+def _seen_sphere(shape: SeenSphere, steps: list[int], a: int) -> Surd | None:
+    found = _hit(shape.eye, steps, a, shape.sphere)
+    return None if found is None else (*found[:3], a * shape.unit)
+
+
+def _seen_triangle(shape: SeenTriangle, steps: list[int]) -> Surd | None:
+    if shape.volume == 0:
+        return None
+    (dx, dy, dz), total = steps, 0
+    for x, y, z in shape.sides:
+        side = dx * x + dy * y + dz * z
+        if side < 0:
+            return None
+        total += side
+    return shape.volume, 1, 0, total * shape.unit
+
+
+def _cross(a: tuple[int, int, int], b: tuple[int, int, int]) -> tuple[int, int, int]:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+def _negative(a: tuple[int, int, int]) -> tuple[int, int, int]:
+    return -a[0], -a[1], -a[2]
+
+
 def _roots(
     eye: list[int], steps: list[int], sphere: list[int], over: int, under: int
 ) -> tuple[Root, Root] | tuple[None, None]:

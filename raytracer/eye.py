@@ -142,7 +142,7 @@ def bundle_of(raster: Raster, origin: np.ndarray, xs: np.ndarray, ys: np.ndarray
     """The rays of single pixels, columns xs and rows ys."""
     origins = np.repeat(origin[None], len(xs), axis=0)
     rays = twofold_eye_rays(raster, xs, ys)
-    return Bundle(origins, rays, lambda k: raster.whole_direction(int(xs[k]), int(ys[k])))
+    return Bundle(origins, rays, lambda k: raster.whole_direction(int(xs[k]), int(ys[k])), True)
 
 
 @_NOT_A_NUMBER_IS_NO_ERROR

@@ -208,8 +208,9 @@ class World:
         return p[0] + (eye[0] - row[0]), p[1] + (eye[1] - row[1]), p[2] + (eye[2] - row[2])
 
     def _within(self, j: int, p: Three, d: Three) -> np.ndarray:
-        first, second, third = self.corners[j - self.first_facet, :9].reshape(3, 3)
-        return within_edges(p, d, first, second, third)  # type: ignore[no-any-return]
+        ax, ay, az, bx, by, bz, cx, cy, cz, *_ = self.corners[j - self.first_facet].tolist()
+        within: np.ndarray = within_edges(p, d, (ax, ay, az), (bx, by, bz), (cx, cy, cz))
+        return within
 
 
 def _some(vectors: Three, which: np.ndarray) -> Three:
@@ -218,7 +219,7 @@ def _some(vectors: Three, which: np.ndarray) -> Three:
 
 def _raised(x: np.ndarray, power: np.ndarray, bits: int) -> np.ndarray:
     if bits >= 0:
-        return raised_to_whole(x, power, bits)  # type: ignore[no-any-return]
+        return np.asarray(raised_to_whole(x, power, bits))
     return np.array([_power(a, b) for a, b in zip(x.tolist(), power.tolist(), strict=True)])
 
 

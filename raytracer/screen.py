@@ -43,10 +43,10 @@ from raytracer.arrays import (
 )
 from raytracer.boxes import Lens, facet_boxes, make_lens
 from raytracer.camera import Raster, eye_grid, fine_columns, fine_rows
-from raytracer.cells import light_cells, resolution_for
 from raytracer.eye import bundle_of, usable_spread
 from raytracer.facets import see_facets
 from raytracer.full import corners_of, surfaces_of, terms_of
+from raytracer.lookup import light_cells, resolution_for, tree_of
 from raytracer.plan import Plan
 from raytracer.pool import cores, share
 from raytracer.scene import Colour, Materials, Scene
@@ -62,6 +62,7 @@ _FEW = 1 << 13  # spheres below which one thread sorts them sooner than two
 _MOST_WORKERS = 8  # that sort: each counts all tiles anew
 _BAND_PIXELS = 1 << 18  # of a numpy stage's block
 _PIXELS_A_MOMENT, _SPHERES_A_MOMENT = 1 << 21, 1 << 15  # what is drawn in two milliseconds or so
+_STACK = 8 * 24  # boxes that may wait, eight a level
 _KEPT = 1 << 26  # bytes of a workspace that is kept
 
 _NOT_A_NUMBER_IS_NO_ERROR = np.errstate(all="ignore")
@@ -310,7 +311,8 @@ def make_full_paints(plan: Plan, screen: Screen) -> FullPaints:
         paints.background, scene.background, paints.lights, surfaces_of(scene).reshape(-1),
         corners_of(screen.origin, corners).reshape(-1), np.concatenate([*starts, _NO_STARTS]),
         np.concatenate([*(ids for _, ids in cells), _NO_IDS]), resolution_for(len(balls) + len(corners)),
-        len(scene.spheres), terms.bits, terms.specular, terms.shadows, terms.mirrors,
+        tree_of(scene.spheres, scene.triangles, balls, corners, screen.kernels), terms.bits, terms.specular,
+        terms.shadows, terms.mirrors,
     )  # fmt: skip
 
 
@@ -343,6 +345,8 @@ def _desk(workspace: Workspace, kernels: ModuleType, worker: int) -> Desk:
         array(size, np.int32, "index", worker),
         workspace.zeros(size, np.bool_, "doubt", worker),
         array(64, np.float64, "batch", worker),
+        array(_STACK, np.int64, "stack", worker),
+        array(_STACK, np.float64, "near", worker),
         array(32, np.uint8, "rest", worker),
     )
     return Desk(scratch, doubts)

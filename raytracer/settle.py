@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from itertools import chain
 from types import ModuleType
@@ -47,6 +47,7 @@ class Bundle(NamedTuple):
     origins: np.ndarray  # (n, 3)
     rays: TwofoldRays  # (n,)
     exact_direction: Callable[[int], tuple[Sequence[float], int]]  # of ray k of these: numbers, and their divisor
+    share_origin: bool = False  # and have whole numbers for directions
 
     def some(self, which: np.ndarray) -> tuple[np.ndarray, TwofoldRays]:
         """Origins and directions of some of them."""
@@ -130,22 +131,47 @@ def polish(hits: Hits, which: Index, source: Source, targets: Targets) -> None:
 
 
 def _settle_exactly(found: Nearest, bundle: Bundle, candidates: Candidates, targets: Targets) -> None:
-    """Decide what two-fold arithmetic left open, in integers, among the spheres that float64 cannot rule out."""
-    open_rays = np.flatnonzero(found.unsure)
+    """Decide what two-fold arithmetic left open, in integers, among the shapes that float64 cannot rule out."""
+    open_rays, seen = np.flatnonzero(found.unsure), dict[int, exact.Seen]()
     pairs = np.cumsum(np.diff(candidates.starts)[open_rays])
     cuts = np.searchsorted(pairs, np.arange(_CHUNK, pairs[-1], _CHUNK))
     for some in np.split(open_rays, np.unique(cuts)):
         contend = _contenders(bundle, candidates.of(some), some, targets)
-        shapes, sizes = _numbers_of(contend, targets)
+        if bundle.share_origin:
+            decide = _nearest_seen(bundle, some, contend, targets, seen)
+        else:
+            decide = _nearest_given(bundle, some, contend, targets)
         ids, starts = contend.ids.tolist(), contend.starts.tolist()
-        ends = np.concatenate([[0], np.cumsum(sizes)])[contend.starts].tolist()
         ts, indices = [], []
-        for j, (k, origin) in enumerate(zip(some.tolist(), bundle.origins[some].tolist(), strict=True)):
-            kinds = sizes[starts[j] : starts[j + 1]]
-            t, i = exact.nearest_of(origin + shapes[ends[j] : ends[j + 1]], *bundle.exact_direction(k), kinds)
+        for start, (t, i) in zip(starts, decide, strict=False):
             ts.append(t)
-            indices.append(ids[starts[j] + i] if i >= 0 else -1)
+            indices.append(ids[start + i] if i >= 0 else -1)
         found.t[some], found.index[some] = ts, indices
+
+
+def _nearest_seen(
+    bundle: Bundle, some: np.ndarray, contend: Candidates, targets: Targets, seen: dict[int, exact.Seen]
+) -> Iterator[tuple[float, int]]:
+    """What rays of one origin hit: t and the place among their candidates. `seen` is what is known of shapes."""
+    starts, ids, origin = contend.starts.tolist(), contend.ids.tolist(), bundle.origins[0].tolist()
+    for k, start, end in zip(some.tolist(), starts, starts[1:], strict=False):
+        for i in ids[start:end]:
+            if i not in seen:
+                seen[i] = exact.seen_from(origin, targets.numbers_of(i))
+        direction, unit = bundle.exact_direction(k)
+        yield exact.nearest_seen([seen[i] for i in ids[start:end]], [int(x) for x in direction], unit)
+
+
+def _nearest_given(
+    bundle: Bundle, some: np.ndarray, contend: Candidates, targets: Targets
+) -> Iterator[tuple[float, int]]:
+    """The same for rays of any origin."""
+    shapes, sizes = _numbers_of(contend, targets)
+    ends = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)[contend.starts].tolist()
+    starts = contend.starts.tolist()
+    for j, (k, origin) in enumerate(zip(some.tolist(), bundle.origins[some].tolist(), strict=True)):
+        kinds = sizes[starts[j] : starts[j + 1]]
+        yield exact.nearest_of(origin + shapes[ends[j] : ends[j + 1]], *bundle.exact_direction(k), kinds)
 
 
 def _numbers_of(candidates: Candidates, targets: Targets) -> tuple[list[float], list[int]]:

@@ -4,7 +4,7 @@ from raytracer.kernels.compiler import cache_named_after_sources
 
 with cache_named_after_sources():
     from raytracer.kernels.bounds import TILE_HEIGHT, TILE_WIDTH, begin, bound, count, fill
-    from raytracer.kernels.bvh import along_curve, build, candidates_in_tree, nearest_in_tree
+    from raytracer.kernels.bvh import along_curve, build, candidates_in_tree, enclose, nearest_in_tree
     from raytracer.kernels.full import CORNERS, radiance_of, sort_into_cells
     from raytracer.kernels.reading import read_plain
     from raytracer.kernels.tiles import (
@@ -34,6 +34,7 @@ __all__ = [
     "candidates",
     "candidates_in_tree",
     "count",
+    "enclose",
     "fill",
     "find_fine_hits",
     "find_hits",

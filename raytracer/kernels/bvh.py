@@ -26,9 +26,23 @@ _DEEPEST = 24  # levels
 @compiled
 def build(balls, order):
     """The tree over spheres (n, 4) in an order, `order` being int64 (n,)."""
+    n = len(order)
+    low, high, spheres = np.empty((n, 3)), np.empty((n, 3)), np.full((4, -(-n // WIDTH) * WIDTH), np.nan)
+    for i in range(n):
+        for axis in range(3):
+            wider = balls[i, 3] + _WIDER * (abs(balls[i, axis]) + balls[i, 3])
+            low[i, axis], high[i, axis] = balls[i, axis] - wider, balls[i, axis] + wider
+    for place in range(n):
+        for column in range(4):
+            spheres[column, place] = balls[order[place], column]
+    return enclose(low, high, order, spheres.reshape(-1))
+
+
+@compiled
+def enclose(shape_low, shape_high, order, spheres):
+    """The tree over boxes (n, 3) in an order; what `spheres` is in `Tree`, or nothing."""
     n, eights = len(order), -(-len(order) // WIDTH)
     ids = np.full(eights * WIDTH, -1, np.int32)
-    spheres = np.full((4, eights * WIDTH), np.nan)
     levels, counts = np.zeros(_DEEPEST, np.int64), np.zeros(_DEEPEST, np.int64)
     count, depth, total = eights, 0, 0
     while True:
@@ -43,19 +57,15 @@ def build(balls, order):
         i = order[place]
         ids[place] = i
         for axis in range(3):
-            centre, radius = balls[i, axis], balls[i, 3]
-            spheres[axis, place] = centre
-            wider = radius + _WIDER * (abs(centre) + radius)
-            low[axis, place >> 3] = min(low[axis, place >> 3], centre - wider)
-            high[axis, place >> 3] = max(high[axis, place >> 3], centre + wider)
-        spheres[3, place] = balls[i, 3]
+            low[axis, place >> 3] = min(low[axis, place >> 3], shape_low[i, axis])
+            high[axis, place >> 3] = max(high[axis, place >> 3], shape_high[i, axis])
     for level in range(1, depth):
         for node in range(counts[level - 1]):
             child, parent = levels[level - 1] + node, levels[level] + (node >> 3)
             for axis in range(3):
                 low[axis, parent] = min(low[axis, parent], low[axis, child])
                 high[axis, parent] = max(high[axis, parent], high[axis, child])
-    return Tree(ids, spheres.reshape(-1), low.reshape(-1), high.reshape(-1), levels, counts, depth)
+    return Tree(ids, spheres, low.reshape(-1), high.reshape(-1), levels, counts, depth)
 
 
 @compiled

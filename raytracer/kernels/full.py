@@ -22,6 +22,7 @@ from raytracer.bounce import (
 from raytracer.certified import inner
 from raytracer.kernels.compiler import borrowing, compiled, inlined
 from raytracer.kernels.lanes import (
+    WIDTH,
     any_of,
     at_least,
     equal_to,
@@ -31,6 +32,7 @@ from raytracer.kernels.lanes import (
     is_hit,
     load,
     raised,
+    smallest_of,
     spread,
     store,
     whole,
@@ -39,10 +41,11 @@ from raytracer.shading import cosine, highlight, land_on_any, raised_to_whole, t
 from raytracer.twofold import select
 
 CORNERS = 12  # numbers a triangle: its corners, how far away they are, and some to spare
+_LONGER = 1.0 + 2.0**-40
 
 
 @inlined
-def radiance(view, paints, t, d, where):
+def radiance(view, paints, t, d, where, scratch):
     """The colours that come along eight eye rays D from hits at t on the shapes at these places."""
     p, n, radius = land_on_any(t, d, view.eye, gather_rows(view.balls, where), at_least(where, view.first_facet))
     red, green, blue, weight = spread(0.0), spread(0.0), spread(0.0), spread(1.0)
@@ -59,7 +62,7 @@ def radiance(view, paints, t, d, where):
             break
         d, facing = reflected(d, n, radius)
         a = inner(d[0], d[1], d[2], d[0], d[1], d[2])
-        t, found = _nearest(view, paints, p, d, a, where, facing < 0.0)
+        t, found = _nearest(view, paints, p, d, a, where, facing < 0.0, weight > 0.0, scratch)
         missed = (weight > 0.0) & ~is_hit(found)
         red = red + select(missed, weight * background[0], 0.0)
         green = green + select(missed, weight * background[1], 0.0)
@@ -136,12 +139,7 @@ def _cell(resolution, d):
 def _blocks(view, paints, j, p, d, a, over_a, where, size):
     """Whether shape j stands between P and P + D."""
     row, own, eye = np.uint64(4) * np.uint64(j), equal_to(where, np.int64(j)), view.eye
-    x, y, z, w = (
-        view.balls[row],
-        view.balls[row + np.uint64(1)],
-        view.balls[row + np.uint64(2)],
-        view.balls[row + np.uint64(3)],
-    )
+    x, y, z, w = _row(view.balls, row)
     if j < view.first_facet:
         o = p[0] + (eye[0] - x), p[1] + (eye[1] - y), p[2] + (eye[2] - z)
         return blocks_sphere(o, d, a, over_a, w, size, own)
@@ -162,27 +160,74 @@ def _within(corners, at, p, d):
 
 
 @inlined
-def _nearest(view, paints, p, d, a, where, from_outside):
+def _nearest(view, paints, p, d, a, where, from_outside, asked, scratch):
     """What rays from P on the shapes at these places hit first."""
     best, index, over_a, size = spread(np.inf), spread(np.int32(-1)), 1.0 / a, abs(p[0]) + abs(p[1]) + abs(p[2])
-    balls, eye, corners = view.balls, view.eye, paints.corners
-    for j in range(np.uint64(paints.spheres)):
-        row, own = np.uint64(4) * j, equal_to(where, np.int64(j))
-        x, y, z, radius = balls[row], balls[row + np.uint64(1)], balls[row + np.uint64(2)], balls[row + np.uint64(3)]
-        o = p[0] + (eye[0] - x), p[1] + (eye[1] - y), p[2] + (eye[2] - z)
-        t = meet_sphere(o, d, a, over_a, radius, size, own, from_outside)
-        index, best = select(t < best, spread(np.int32(j)), index), select(t < best, t, best)
-    for k in range(np.uint64(len(corners) // CORNERS)):
-        j = k + np.uint64(view.first_facet)
-        row, at, own = np.uint64(4) * j, np.uint64(CORNERS) * k, equal_to(where, np.int64(j))
-        plane = balls[row], balls[row + np.uint64(1)], balls[row + np.uint64(2)], balls[row + np.uint64(3)]
-        over, under = plane_ahead(p, d, plane, corners[at + np.uint64(9)], size, own)
-        t = over / under
-        closer = (over > 0.0) & (t < best)
-        if any_of(closer):
-            closer = closer & _within(corners, at, p, d)
-            index, best = select(closer, spread(np.int32(j)), index), select(closer, t, best)
+    best, tree, stack, near, top = select(asked, best, -np.inf), paints.tree, scratch.stack, scratch.near, 0
+    over_d = 1.0 / d[0], 1.0 / d[1], 1.0 / d[2]
+    top = _push(tree, view.eye, p, over_d, best, tree.depth - 1, 0, stack, near, top)
+    while top > 0:
+        top -= 1
+        if not any_of(near[top] <= best):
+            continue
+        level, node = stack[top] & 31, stack[top] >> 5
+        if level > 0:
+            top = _push(tree, view.eye, p, over_d, best, level - 1, node * WIDTH, stack, near, top)
+            continue
+        for place in range(node * WIDTH, (node + 1) * WIDTH):
+            j = tree.ids[place]
+            if j < 0:
+                break
+            t = _meet(view, paints, j, p, d, a, over_a, where, size, from_outside)
+            index, best = select(t < best, spread(j), index), select(t < best, t, best)
     return best, index
+
+
+@inlined
+def _push(tree, eye, p, over_d, best, level, first, stack, near, top):
+    """Put those of up to eight boxes on the stack that any of the rays may hit something in, the farthest first."""
+    size, at, base = np.uint64(len(tree.low) // 3), np.uint64(tree.levels[level] + first), top
+    for child in range(np.uint64(min(WIDTH, tree.counts[level] - first))):
+        enter, leave = spread(0.0), spread(np.inf)
+        for axis in range(3):
+            place = at + child + size * np.uint64(axis)
+            one, other = (
+                ((tree.low[place] - eye[axis]) - p[axis]) * over_d[axis],
+                ((tree.high[place] - eye[axis]) - p[axis]) * over_d[axis],
+            )
+            first_side, last_side = select(one < other, one, other), select(one < other, other, one)
+            enter = select(first_side > enter, first_side, enter)  # what is not a number says nothing
+            leave = select(last_side < leave, last_side, leave)
+        open_ = (enter <= leave * _LONGER) & (enter <= best)
+        if any_of(open_):
+            time, place = smallest_of(select(open_, enter, np.inf)), top
+            while place > base and near[place - 1] < time:
+                near[place], stack[place] = near[place - 1], stack[place - 1]
+                place -= 1
+            near[place], stack[place] = time, (first + np.int64(child)) << 5 | level
+            top += 1
+    return top
+
+
+@inlined
+def _meet(view, paints, j, p, d, a, over_a, where, size, from_outside):
+    """Where rays meet shape j, +inf where they do not."""
+    row, own, eye = np.uint64(4) * np.uint64(j), equal_to(where, np.int64(j)), view.eye
+    x, y, z, w = _row(view.balls, row)
+    if j < view.first_facet:
+        o = p[0] + (eye[0] - x), p[1] + (eye[1] - y), p[2] + (eye[2] - z)
+        return meet_sphere(o, d, a, over_a, w, size, own, from_outside)
+    corners, at = paints.corners, np.uint64(CORNERS) * np.uint64(j - view.first_facet)
+    over, under = plane_ahead(p, d, (x, y, z, w), corners[at + np.uint64(9)], size, own)
+    ahead = over > 0.0
+    if any_of(ahead):
+        ahead = ahead & _within(corners, at, p, d)
+    return select(ahead, over / under, np.inf)
+
+
+@inlined
+def _row(table, row):
+    return table[row], table[row + np.uint64(1)], table[row + np.uint64(2)], table[row + np.uint64(3)]
 
 
 @compiled
@@ -222,7 +267,7 @@ def radiance_of(view, paints, t, index, columns, rows, scratch, colours):
             across * u[1] + (up * v[1] - back[1]),
             across * u[2] + (up * v[2] - back[2]),
         )
-        red, green, blue = radiance(view, paints, load(t, k), d, load(index, k))
+        red, green, blue = radiance(view, paints, load(t, k), d, load(index, k), scratch)
         store(scratch.batch, 0, red)
         store(scratch.batch, 8, green)
         store(scratch.batch, 16, blue)

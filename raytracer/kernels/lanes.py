@@ -285,6 +285,18 @@ def at_least(typing, places, number):
 
 
 @intrinsic
+def smallest_of(typing, lanes):
+    """The smallest of the lanes, none of which is not a number."""
+
+    def lower(context, builder, sig, args):
+        kind = ir.FunctionType(_DOUBLE, [args[0].type])
+        name = f"llvm.vector.reduce.fmin.v{WIDTH}f64"
+        return builder.call(get_or_insert_function(builder.module, kind, name), args)
+
+    return types.float64(lanes), lower
+
+
+@intrinsic
 def is_hit(typing, places):
     """Where a place is not negative."""
 

@@ -108,12 +108,12 @@ def _shaded_tile(view, scratch, tile, paints, out):
                 continue
             where = select(hit, index, spread(largest_of(index)))
             t, direction = _ray(view, line, load(scratch.k, place), x)
-            red, green, blue = shade(view, paints, t, direction, where)
+            red, green, blue = shade(view, paints, t, direction, where, scratch)
             red, green, blue = _over(background, hit, to_byte(red), to_byte(green), to_byte(blue))
             put_lanes(out, row, x, tile.right, red, green, blue, scratch)
 
 
-def _diffuse(view, paints, t, direction, where):
+def _diffuse(view, paints, t, direction, where, scratch):
     """`stages.diffuse`."""
     p, n, radius = surface(view, t, direction, where)
     red, green, blue, light = spread(0.0), spread(0.0), spread(0.0), paints.lights
@@ -126,7 +126,7 @@ def _diffuse(view, paints, t, direction, where):
 
 
 @inlined
-def _normal(view, paints, t, direction, where):
+def _normal(view, paints, t, direction, where, scratch):
     """`stages.normal`."""
     _, n, radius = _surface_of_any(view, t, direction, where)
     return (n[0] / radius + 1.0) / 2.0, (n[1] / radius + 1.0) / 2.0, (n[2] / radius + 1.0) / 2.0

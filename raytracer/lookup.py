@@ -1,16 +1,19 @@
-"""Which shapes a light may see in which direction: the directions from it, cut into the cells of a cube.
+"""Where to look for what a ray from a shape may hit. Kept from picture to picture, as long as the shapes stay.
 
-Each face of the cube is a picture of the shapes as an eye at the light would see it, a cell being a pixel, and the
-boxes of pixels are those of `boxes`, widened from the rays through corners of pixels to all of their area.
+Rays towards a light: the directions from it are cut into the cells of a cube, each with a list of the shapes that the
+light may see there. Each face of the cube is a picture of the shapes as an eye at the light would see it, a cell being
+a pixel, and the boxes of pixels are those of `boxes`, widened from the corners of pixels to all of their area.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from types import ModuleType
 
 import numpy as np
 
 from raytracer import plain
+from raytracer.arrays import Tree
 from raytracer.boxes import Lens, facet_boxes, make_lens
 from raytracer.camera import make_raster
 from raytracer.scene import Camera, Spheres, Triangles, Vector
@@ -18,9 +21,10 @@ from raytracer.scene import Camera, Spheres, Triangles, Vector
 Cells = tuple[np.ndarray, np.ndarray]  # where each cell's list begins, int64; and the numbers of shapes, int32
 
 _MOST = 512  # cells along an edge of the cube
-_KEPT = 16  # lights
+_KEPT = 16  # cubes and trees
+_WIDER = 2.0**-46  # of a box, and of its distance from the origin
 
-_kept: dict[tuple[int, int, Vector], tuple[Spheres, Triangles, Cells]] = {}
+_kept: dict[tuple[int, int, Vector | None], tuple[Spheres, Triangles, Cells | Tree]] = {}
 
 
 def resolution_for(shapes: int) -> int:
@@ -31,14 +35,42 @@ def resolution_for(shapes: int) -> int:
 def light_cells(
     spheres: Spheres, triangles: Triangles, balls: np.ndarray, corners: np.ndarray, light: np.ndarray, path: ModuleType
 ) -> Cells:
-    """The lists of a light's cube. Kept, for as long as the shapes and the light are the same."""
-    key = id(spheres), id(triangles), (float(light[0]), float(light[1]), float(light[2]))
+    """The lists of a light's cube."""
+    place = float(light[0]), float(light[1]), float(light[2])
+    cells = _keep(spheres, triangles, place, lambda: _light_cells(balls, corners, light, path))
+    assert not isinstance(cells, Tree)
+    return cells
+
+
+def tree_of(spheres: Spheres, triangles: Triangles, balls: np.ndarray, corners: np.ndarray, path: ModuleType) -> Tree:
+    """The tree over all shapes, which are numbered as in `View.balls`."""
+    tree = _keep(spheres, triangles, None, lambda: _tree(balls, len(spheres), corners, path))
+    assert isinstance(tree, Tree)
+    return tree
+
+
+def _keep(
+    spheres: Spheres, triangles: Triangles, place: Vector | None, make: Callable[[], Cells | Tree]
+) -> Cells | Tree:
+    key = id(spheres), id(triangles), place
     found = _kept.get(key)
     if found is None:
         while len(_kept) >= _KEPT:
             _kept.pop(next(iter(_kept)), None)
-        found = _kept[key] = spheres, triangles, _light_cells(balls, corners, light, path)
+        found = _kept[key] = spheres, triangles, make()
     return found[2]
+
+
+def _tree(balls: np.ndarray, spheres: int, corners: np.ndarray, path: ModuleType) -> Tree:
+    centres, radii = balls[:spheres, :3], balls[:spheres, 3:]
+    low = np.concatenate([centres - radii, corners.min(axis=1, initial=np.inf)])
+    high = np.concatenate([centres + radii, corners.max(axis=1, initial=-np.inf)])
+    wider = _WIDER * (np.abs(low) + np.abs(high)).sum(axis=1, keepdims=True)
+    about = np.column_stack([(low + high) / 2.0, (high - low).max(axis=1) / 2.0])
+    order = np.argsort(path.along_curve(about)) if len(about) else np.empty(0, np.int64)
+    tree: Tree = path.enclose(low - wider, high + wider, order, np.empty(0))
+    ids = np.where(tree.ids >= spheres, tree.ids + (len(balls) - spheres), tree.ids)
+    return tree._replace(ids=ids.astype(np.int32))
 
 
 def _light_cells(balls: np.ndarray, corners: np.ndarray, light: np.ndarray, path: ModuleType) -> Cells:
