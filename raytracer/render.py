@@ -25,6 +25,8 @@ from raytracer.stages import Block, Whole
 
 _GREY = Materials(np.full((1, 11), 0.5))
 
+_PIECES = 24  # or more, of a picture whose pixels take long: so that all cores are done at about the same time
+
 Progress = Callable[[int, int, slice], object]
 
 
@@ -109,19 +111,30 @@ def share_bands(tracer: Eye | Screen, plan: Plan, watch: Watch, work: Callable[[
 
     Work returns the rows of the picture that it has finished.
     """
-    bands = tracer.bands(plan.shading)
+    share_pieces(tracer, plan, watch, 1, lambda rows, piece, worker: work(rows, worker))
 
-    def one(rows: slice, worker: int) -> slice:
+
+def share_pieces(
+    tracer: Eye | Screen, plan: Plan, watch: Watch, pieces: int, work: Callable[[slice, int, int], slice]
+) -> None:
+    """The same for bands in so many pieces each: work(rows, piece, worker)."""
+    bands = tracer.bands(plan.shading)
+    left = {rows.start: pieces for rows in bands}
+
+    def one(job: tuple[slice, int], worker: int) -> tuple[int, slice]:
         if watch.cancelled is not None and watch.cancelled():
             raise Cancelled
-        return work(rows, worker)
+        return job[0].start, work(*job, worker)
 
-    def tell(rows: slice) -> None:
-        watch.done += 1
-        if watch.progress is not None:
-            watch.progress(watch.done, watch.rounds * len(bands), rows)
+    def tell(done: tuple[int, slice]) -> None:
+        band, rows = done
+        left[band] -= 1
+        if left[band] == 0:
+            watch.done += 1
+            if watch.progress is not None:
+                watch.progress(watch.done, watch.rounds * len(bands), rows)
 
-    share(bands, one, watch.threads, tell)
+    share([(rows, piece) for rows in bands for piece in range(pieces)], one, watch.threads, tell)
 
 
 def _paint(plan: Plan, screen: Screen, picture: np.ndarray, watch: Watch) -> None:
@@ -145,12 +158,14 @@ def _paint(plan: Plan, screen: Screen, picture: np.ndarray, watch: Watch) -> Non
         block = Block(plan.scene, plan.raster, doubtful.ys, hits, plan.lights, doubtful.xs)
         picture[doubtful.ys, doubtful.xs] = _colours(plan, block)
 
-    def paint(rows: slice, worker: int) -> slice:
-        for doubtful in screen.paint(plan.painter, rows, worker, paints, canvas):
+    pieces = -(-_PIECES // len(screen.bands(plan.shading))) if plan.stage.throws_on else 1
+
+    def paint(rows: slice, piece: int, worker: int) -> slice:
+        for doubtful in screen.paint(plan.painter, rows, worker, paints, canvas, (piece, pieces)):
             decide(doubtful)
         return rows
 
-    share_bands(screen, plan, watch, paint)
+    share_pieces(screen, plan, watch, pieces, paint)
     for doubtful in screen.doubtful(*range(len(screen.desks))):
         decide(doubtful)
 

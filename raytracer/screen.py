@@ -202,15 +202,24 @@ class Screen(NamedTuple):
         return self.targets.path
 
     def paint(
-        self, painter: str, rows: slice, worker: int, paints: Paints | FullPaints | FineRays, out: Canvas | HitRows
+        self,
+        painter: str,
+        rows: slice,
+        worker: int,
+        paints: Paints | FullPaints | FineRays,
+        out: Canvas | HitRows,
+        part: tuple[int, int] = (0, 1),
     ) -> Iterator[Pixels]:
         """Paint these rows, cut between tiles, by a kernel; yields doubtful pixels when there is no room for more.
+
+        Or, of so many parts of their tiles, paint one: part is which, counted from 0, and of how many.
 
         What is left of them `doubtful` tells.
         """
         kernel, (scratch, doubts) = getattr(self.kernels, painter), self.desks[worker]
         height, columns = self.kernels.TILE_HEIGHT, self.bins.columns
-        tile, last = rows.start // height * columns, -(-rows.stop // height) * columns
+        first, tiles = rows.start // height * columns, -(-(rows.stop - rows.start) // height) * columns
+        tile, last = first + tiles * part[0] // part[1], first + tiles * (part[0] + 1) // part[1]
         while (tile := kernel(self.view, self.slow, self.bins, tile, last, scratch, doubts, paints, out)) < last:
             yield from self.doubtful(worker)
 

@@ -107,15 +107,14 @@ def _shaded_tile(view, scratch, tile, paints, out):
                 put_lanes(out, row, x, tile.right, *background, scratch)
                 continue
             where = select(hit, index, spread(largest_of(index)))
-            t, direction = _ray(view, line, load(scratch.k, place), x)
-            red, green, blue = shade(view, paints, t, direction, where, scratch)
+            red, green, blue = shade(view, paints, line, load(scratch.k, place), x, where, scratch)
             red, green, blue = _over(background, hit, to_byte(red), to_byte(green), to_byte(blue))
             put_lanes(out, row, x, tile.right, red, green, blue, scratch)
 
 
-def _diffuse(view, paints, t, direction, where, scratch):
+def _diffuse(view, paints, line, k, x, where, scratch):
     """`stages.diffuse`."""
-    p, n, radius = surface(view, t, direction, where)
+    p, n, radius = surface(view, line, k, x, where)
     red, green, blue, light = spread(0.0), spread(0.0), spread(0.0), paints.lights
     for i in range(np.uint64(len(light))):
         facing, square = towards(p, n, (light[i, 0], light[i, 1], light[i, 2]))
@@ -126,10 +125,17 @@ def _diffuse(view, paints, t, direction, where, scratch):
 
 
 @inlined
-def _normal(view, paints, t, direction, where, scratch):
+def _normal(view, paints, line, k, x, where, scratch):
     """`stages.normal`."""
-    _, n, radius = _surface_of_any(view, t, direction, where)
+    _, n, radius = _surface_of_any(view, line, k, x, where)
     return (n[0] / radius + 1.0) / 2.0, (n[1] / radius + 1.0) / 2.0, (n[2] / radius + 1.0) / 2.0
+
+
+@inlined
+def _full(view, paints, line, k, x, where, scratch):
+    """`stages.full`."""
+    t, direction = _ray(view, line, k, x)
+    return radiance(view, paints, t, direction, where, scratch)
 
 
 @inlined
@@ -146,16 +152,18 @@ def _line(view, row):
 
 
 @inlined
-def _surface_of_spheres(view, t, direction, where):
+def _surface_of_spheres(view, line, k, x, where):
     """The hit points as seen from the eye and from their spheres' centres, and the radii."""
+    t, direction = _ray(view, line, k, x)
     (cx, cy, cz, radius), eye = _ball(view, where), view.eye
     p, n = land(t, direction, (eye[0] - cx, eye[1] - cy, eye[2] - cz), radius)
     return p, n, radius
 
 
 @inlined
-def _surface_of_any(view, t, direction, where):
+def _surface_of_any(view, line, k, x, where):
     """The same of spheres and triangles."""
+    t, direction = _ray(view, line, k, x)
     return land_on_any(t, direction, view.eye, _ball(view, where), at_least(where, view.first_facet))
 
 
@@ -256,7 +264,7 @@ _diffuse_of_any = variant(_diffuse, "_diffuse_of_any", inlined, surface=_surface
 _diffuse_tile = variant(_shaded_tile, "_diffuse_tile", shade=_diffuse_of_spheres)
 _diffuse_any_tile = variant(_shaded_tile, "_diffuse_any_tile", shade=_diffuse_of_any)
 _normal_tile = variant(_shaded_tile, "_normal_tile", shade=_normal)
-_full_tile = variant(_shaded_tile, "_full_tile", shade=radiance)
+_full_tile = variant(_shaded_tile, "_full_tile", shade=_full)
 paint_flat = variant(_paint, "paint_flat", paint_tile=_flat_tile, fill_tile=_fill_tile, see=see_tile)
 paint_diffuse = variant(_paint, "paint_diffuse", paint_tile=_diffuse_tile, fill_tile=_fill_tile, see=see_tile)
 paint_diffuse_unchecked = variant(
