@@ -8,8 +8,10 @@ from functools import cached_property
 from types import ModuleType
 
 from raytracer import backend, plain
+from raytracer.bounce import MOST_REFLECTIONS
 from raytracer.camera import Raster, make_raster
 from raytracer.eye import Eye, open_eye
+from raytracer.full import terms_of
 from raytracer.methods import CERTIFIED, METHODS, check_method
 from raytracer.scene import Light, Scene
 from raytracer.stages import LIGHT_RANGE, STAGES, Stage
@@ -119,16 +121,38 @@ def _reasons(plan: Plan) -> Iterator[str]:
     if not stage.needs_normals:
         yield "no point, no normal: this stage asks only what is hit"
     yield from _reasons_for_lights(plan)
-    table = scene.materials.table
-    for columns, word in ((table[:, 3:6], "ambient"), (table[:, 6:9], "specular"), (table[:, 10], "k_refl")):
-        if columns.any():
-            yield f"{word} given, not used by this stage"
-    if stage.needs_lights:
-        yield "no shadow rays, no reflected rays: this stage has none"
+    if stage.throws_on:
+        yield from _reasons_for_terms(scene, plan.lights)
+    else:
+        table = scene.materials.table
+        for columns, word in ((table[:, 3:6], "ambient"), (table[:, 6:9], "specular"), (table[:, 10], "k_refl")):
+            if columns.any():
+                yield f"{word} given, not used by this stage"
+        if stage.needs_lights:
+            yield "no shadow rays, no reflected rays: this stage has none"
     if stage.needs_truth:
         yield "each ray is traced twice, by the method and for the truth: this stage compares them"
     if stage.needs_whole:
         yield "the whole picture's hits are kept: this stage compares pixels with each other"
+
+
+def _reasons_for_terms(scene: Scene, lights: tuple[Light, ...]) -> Iterator[str]:
+    terms = terms_of(scene, lights)
+    if terms.shadows:
+        yield "a shadow ray to each light that a surface faces: the light's own cells say which shapes may be between"
+    elif lights:
+        yield "one convex shape cannot shadow itself: no shadow rays"
+    else:
+        yield "no light: no shadow rays"
+    if terms.specular:
+        how = "by squaring" if terms.bits >= 0 else "by pow, as not all are whole numbers"
+        yield f"specular given: a highlight of each light, its power {how}"
+    else:
+        yield "no specular colour: no highlights"
+    if terms.mirrors:
+        yield f"k_refl given: reflected rays, at most {MOST_REFLECTIONS} after each other"
+    else:
+        yield "no k_refl above 0: no reflected rays"
 
 
 def _reasons_for_lights(plan: Plan) -> Iterator[str]:
