@@ -84,6 +84,13 @@ class Candidates(NamedTuple):
         ids = np.tile(np.arange(spheres, dtype=np.int32), rays)
         return cls(np.arange(rays + 1, dtype=np.int64) * spheres, ids)
 
+    def and_all(self, first: int, count: int) -> Candidates:
+        """These, and for every ray so many shapes from a number on that comes after all of these."""
+        parts = np.split(self.ids, self.starts[1:-1])
+        more = np.arange(first, first + count, dtype=np.int32)
+        ids = np.concatenate([part for ours in parts for part in (ours, more)])
+        return Candidates(self.starts + count * np.arange(len(self.starts)), ids)
+
     def rows(self, which: np.ndarray) -> np.ndarray:
         """The number of the ray for each id of these rays, in order, counted from 0."""
         return np.repeat(np.arange(len(which)), np.diff(self.starts)[which])

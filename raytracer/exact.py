@@ -153,6 +153,13 @@ def volume(origin: Sequence[Exact], corners: Sequence[Sequence[Exact]]) -> Fract
     return a[0] * x + a[1] * y + a[2] * z
 
 
+def has_area(corners: Sequence[float]) -> bool:
+    """Whether three corners, nine numbers, do not lie on one line."""
+    (ax, ay, az, *numbers), _ = _integers(corners)
+    bx, by, bz, cx, cy, cz = numbers
+    return any(_cross((bx - ax, by - ay, bz - az), (cx - ax, cy - ay, cz - az)))
+
+
 def _hit(eye: list[int], steps: list[int], a: int, sphere: list[int]) -> Surd | None:
     """The smallest root above 0, but for the factor that all roots of the ray share."""
     middle, radicand = _reduced(eye, steps, a, sphere)

@@ -18,8 +18,8 @@ from __future__ import annotations
 import numpy as np
 
 from raytracer import exact
-from raytracer.arrays import Facets, Grid, TwofoldRays, View
-from raytracer.certified import FACET_ERROR, LARGEST, SMALLEST, STEEP
+from raytracer.arrays import Facets, Grid, Nearest, Rays, TwofoldRays, View
+from raytracer.certified import FACET_ERROR, K_ERROR, LARGEST, SMALLEST, STEEP, Three, nearer
 from raytracer.scene import vector
 from raytracer.twofold import Twofold, add, divide, dot, multiply, two_sum
 
@@ -76,6 +76,38 @@ def _unit_normals(corners: np.ndarray) -> np.ndarray:
     first, second = np.moveaxis(np.ldexp(edges, -exponents[:, :, None]), 1, 0)
     normals = np.cross(first, second)
     return normals / _length(normals)[:, None]
+
+
+def nearest_facets(origins: np.ndarray, rays: Rays, corners: np.ndarray, nearest: Nearest, number: int) -> None:
+    """What rays (n,) from origins (n, 3) meet of triangles (m, 3, 3), beside what they have met already, in place.
+
+    The first triangle has this number.
+    """
+    direction = np.stack(rays[:3], axis=-1)
+    for i, triangle in enumerate(corners):
+        t, error, low = _meet(origins, direction, rays.reach, triangle)
+        found = nearer(*_so_far(nearest), t, 0.0, error, low, number + i)
+        for array, value in zip(nearest, (found[0], *found[2:]), strict=True):
+            array[...] = value
+
+
+def _so_far(nearest: Nearest) -> tuple[np.ndarray, float, np.ndarray, np.ndarray, np.ndarray]:
+    return nearest.t, 0.0, nearest.error, nearest.index, nearest.unsure
+
+
+def _meet(origins: np.ndarray, direction: np.ndarray, reach: np.ndarray, triangle: np.ndarray) -> Three:
+    """`certified.meet` for rays (n,) and a triangle (3, 3): t, a bound of its error, and `low`: 0 if not certain."""
+    a, edges = triangle - origins[:, None], triangle[_NEXT] - triangle
+    sizes, lengths, extent = _length(a), _length(edges), _length(edges[:1]) * _length(edges[1:2])
+    normal = normals_of(triangle[None])[0]
+    nearest = a[np.arange(len(a)), np.argmin(sizes, axis=1)]
+    volume, slope = _dot(normal, nearest) / (extent * sizes.min(axis=1)), _dot(normal, direction) / (extent * reach)
+    sides = _dot(np.cross(a, edges), direction[:, None]) / (sizes * lengths * reach[:, None]) * np.sign(volume)[:, None]
+    least, most, slope = sides.min(axis=1), sides.max(axis=1), slope * np.sign(volume)
+    beside = (least < -FACET_ERROR) & ((most > FACET_ERROR) | (np.abs(volume) > STEEP))
+    sure = (least > FACET_ERROR) & (np.abs(volume) > STEEP) & (slope > STEEP)
+    t = np.abs(volume) * sizes.min(axis=1) / (slope * reach)
+    return np.where(sure, t, np.inf), np.where(sure, K_ERROR * t, 0.0), np.where(sure | beside, np.inf, 0.0)
 
 
 def certain_misses(origins: np.ndarray, rays: TwofoldRays, corners: np.ndarray) -> np.ndarray:

@@ -22,7 +22,7 @@ _CHUNK = 1 << 14  # pairs of a ray and a sphere that are looked at together
 Index = tuple[np.ndarray, ...]
 
 
-_NO_CORNERS, _NO_PLACES = np.empty((0, 3, 3)), np.empty(0, np.int32)
+NO_CORNERS, _NO_PLACES = np.empty((0, 3, 3)), np.empty(0, np.int32)
 
 
 class Targets(NamedTuple):
@@ -31,7 +31,7 @@ class Targets(NamedTuple):
     balls: np.ndarray  # (s, 4): x, y, z, radius
     sides: Sides  # what is known of c from where all rays start
     path: ModuleType  # `raytracer.plain` or `raytracer.kernels`
-    corners: np.ndarray = _NO_CORNERS  # (n, 3, 3), of triangles
+    corners: np.ndarray = NO_CORNERS  # (n, 3, 3), of triangles
     order: np.ndarray = _NO_PLACES  # int32 (s + n,), places in the file; of no use where there are no triangles
 
     def numbers_of(self, i: int) -> list[float]:

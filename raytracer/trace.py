@@ -7,12 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from raytracer import backend, plain
+from raytracer import backend, exact, plain
 from raytracer.arrays import Candidates, Hits, Nearest, Sides, Tree
 from raytracer.camera import given_rays, twofold_given_rays
+from raytracer.facets import nearest_facets
 from raytracer.methods import CERTIFIED, check_method
 from raytracer.pool import share
-from raytracer.settle import Bundle, Index, Targets, polish, settle
+from raytracer.settle import NO_CORNERS, Bundle, Index, Targets, polish, settle
 from raytracer.units import in_units, unit_directions
 from raytracer.usual import usual_given
 
@@ -24,7 +25,13 @@ _NOT_A_NUMBER_IS_NO_ERROR = np.errstate(all="ignore")
 
 
 def ray_intersect_scene(
-    origins: np.ndarray, directions: np.ndarray, centres: np.ndarray, radii: np.ndarray, method: str = CERTIFIED
+    origins: np.ndarray,
+    directions: np.ndarray,
+    centres: np.ndarray,
+    radii: np.ndarray,
+    method: str = CERTIFIED,
+    *,
+    triangles: np.ndarray | None = None,
 ) -> Hits:
     """What each of n rays hits first of s spheres: `Hits` of shape (n,), `index` counting the spheres given.
 
@@ -33,29 +40,44 @@ def ray_intersect_scene(
     tangent ray hits, from inside the far root is the hit, and of equal t the sphere that comes first wins. With another
     method of `METHODS`, it is what that method makes of it.
 
+    triangles are corners (m, 3, 3), counted after the spheres. Their edges belong to them, and a ray in a triangle's
+    plane does not hit it. They are the same for all methods, which are for spheres, but only certain for `certified`.
+
     A t beyond the range of float64 is +inf or 0, its index says that it is a hit all the same.
 
-    ValueError: there is no such method, a direction is zero, a number is not finite, a radius is not positive, or the
-    shapes do not fit.
+    ValueError: there is no such method, a direction is zero, a number is not finite, a radius is not positive, a
+    triangle has no area, or the shapes do not fit.
     """
     origins, directions = _vectors("origins", origins), _vectors("directions", directions)
     centres, radii = _vectors("centres", centres), np.ascontiguousarray(radii, np.float64)
+    corners = np.empty((0, 3, 3)) if triangles is None else np.ascontiguousarray(triangles, np.float64)
     _refuse_bad_rays(origins, directions, centres, radii)
+    _refuse_bad_triangles(corners)
     check_method(method)
     path = backend.choose(len(origins) * len(radii), -(-len(origins) // _CHUNK) * len(radii))
-    return trace_given(origins, directions, centres, radii, method, path)
+    return trace_given(origins, directions, centres, radii, method, path, corners)
 
 
 @_NOT_A_NUMBER_IS_NO_ERROR
 def trace_given(
-    origins: np.ndarray, directions: np.ndarray, centres: np.ndarray, radii: np.ndarray, method: str, path: ModuleType
+    origins: np.ndarray,
+    directions: np.ndarray,
+    centres: np.ndarray,
+    radii: np.ndarray,
+    method: str,
+    path: ModuleType,
+    corners: np.ndarray = NO_CORNERS,
 ) -> Hits:
     """`ray_intersect_scene` on a path of one's choice, of arrays that are known to be good."""
     if method != CERTIFIED:
-        return usual_given(method, origins, directions, centres, radii, path)
-    unit, (origins, balls) = in_units(origins, np.column_stack([centres, radii]))
+        hits = usual_given(method, origins, directions, centres, radii, path)
+        nearest = Nearest(hits.t, np.zeros(hits.t.shape), hits.index, np.zeros(hits.t.shape, bool))
+        nearest_facets(origins, given_rays(directions), corners, nearest, len(radii))
+        return hits
+    unit, (origins, balls, corners) = in_units(origins, np.column_stack([centres, radii]), corners)
     exponents, directions = unit_directions(directions)
-    targets = Targets(balls, Sides.unknown(), path)
+    order = np.arange(len(balls) + len(corners), dtype=np.int32)
+    targets = Targets(balls, Sides.unknown(), path, corners, order)
     tree = _plant(balls, path) if path is not plain and len(balls) > _FEW else None
     hits = Hits(np.empty(len(origins)), np.empty(len(origins), np.int32))
 
@@ -92,6 +114,11 @@ class GivenRays(NamedTuple):
             path.nearest_in_tree(self.origins, rays, balls, self.tree, nearest)
         hits = Hits(nearest.t, nearest.index)
         left = path.refine_given(self.origins, rays, balls, hits.t, hits.index, nearest.unsure)
+        if len(self.targets.corners):
+            nearest_facets(self.origins, rays, self.targets.corners, nearest, len(balls))
+            certain = ~nearest.unsure
+            facets = np.flatnonzero((nearest.index >= len(balls)) & certain)
+            left = np.concatenate([left[(nearest.index[left] < len(balls)) & certain[left]], facets])
         settle(hits, nearest.unsure, self, self.targets)
         polish(hits, (left,), self, self.targets)
         return hits
@@ -101,12 +128,12 @@ class GivenRays(NamedTuple):
         return Bundle(self.origins[which], twofold_given_rays(chosen), lambda k: (chosen[k].tolist(), 1))
 
     def candidates(self, which: Index) -> Candidates:
+        spheres, facets = len(self.targets.balls), len(self.targets.corners)
         if self.tree is None:
-            return Candidates.all(len(which[0]), len(self.targets.balls))
-        rays = given_rays(self.directions[which])
-        return Candidates(
-            *self.targets.path.candidates_in_tree(self.origins[which], rays, self.targets.balls, self.tree)
-        )
+            return Candidates.all(len(which[0]), spheres + facets)
+        rays, origins = given_rays(self.directions[which]), self.origins[which]
+        of_spheres = Candidates(*self.targets.path.candidates_in_tree(origins, rays, self.targets.balls, self.tree))
+        return of_spheres.and_all(spheres, facets) if facets else of_spheres
 
 
 def _vectors(name: str, vectors: np.ndarray) -> np.ndarray:
@@ -116,6 +143,17 @@ def _vectors(name: str, vectors: np.ndarray) -> np.ndarray:
     if not np.isfinite(array).all():
         raise ValueError(f"{name}: row {np.argmin(np.isfinite(array).all(axis=1))} is not finite")
     return array
+
+
+def _refuse_bad_triangles(corners: np.ndarray) -> None:
+    if corners.ndim != 3 or corners.shape[1:] != (3, 3):
+        raise ValueError(f"triangles: found an array of shape {corners.shape}, expected (m, 3, 3)")
+    bad = np.flatnonzero(~np.isfinite(corners).all(axis=(1, 2)))
+    if bad.size:
+        raise ValueError(f"triangles: number {bad[0]} has a corner that is not finite")
+    for i, numbers in enumerate(corners.reshape(-1, 9).tolist()):
+        if not exact.has_area(numbers):
+            raise ValueError(f"triangles: the corners of number {i} lie on one line")
 
 
 def _refuse_bad_rays(origins: np.ndarray, directions: np.ndarray, centres: np.ndarray, radii: np.ndarray) -> None:

@@ -244,3 +244,72 @@ def test_t_is_right_to_the_last_digit_very_close_to_a_sphere(path):
             t, index = exact.nearest_hit(scene.camera.eye, direction, [((x, y, z), radius)], unit)
             assert hits.index[row, column] == index
             assert hits.t[row, column] == t or abs(hits.t[row, column] - t) <= np.spacing(t)
+
+
+def random_triangles(count, seed):
+    rng = np.random.default_rng(seed)
+    return rng.uniform(-3, 3, (count, 1, 3)) + rng.uniform(-1, 1, (count, 3, 3))
+
+
+def assert_hits_are_exact(hits, origins, directions, balls, corners):
+    shapes = [[*ball] for ball in balls.tolist()] + corners.reshape(-1, 9).tolist()
+    sizes, numbers = list(map(len, shapes)), list(chain.from_iterable(shapes))
+    for k in range(len(origins)):
+        t, index = exact.nearest_of(origins[k].tolist() + numbers, directions[k].tolist(), 1, sizes)
+        assert hits.index[k] == index
+        assert hits.t[k] == t or abs(hits.t[k] - t) <= np.spacing(t)
+
+
+@pytest.mark.parametrize("spheres", [0, 5, 40])
+def test_rays_meet_spheres_and_triangles(path, spheres):
+    origins, _, centres, radii = random_rays(300, 40, seed=3)
+    corners, rng = random_triangles(12, 4), np.random.default_rng(9)
+    directions = corners.mean(axis=1)[rng.integers(0, 12, 300)] + rng.uniform(-0.5, 0.5, (300, 3)) - origins
+    hits = ray_intersect_scene(origins, directions, centres[:spheres], radii[:spheres], triangles=corners)
+    assert (hits.index >= spheres).sum() > 10
+    balls = np.column_stack([centres, radii])[:spheres]
+    assert_hits_are_exact(hits, origins, directions, balls, corners)
+
+
+def test_rays_through_edges_and_corners_and_within_planes(path):
+    """Points on edges that floats hold exactly, seen from origins that floats hold exactly."""
+    rng = np.random.default_rng(8)
+    corners = rng.integers(-8, 8, (6, 3, 3)).astype(float)
+    corners = np.concatenate([corners, corners[:, [1, 0, 2]] + [[[0, 0, 0], [0, 0, 0], [1, 2, 3]]]])  # that share edges
+    flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    corners = corners[flat.any(axis=1)]
+    weights = rng.integers(0, 3, (400, 3))
+    weights[~weights.any(axis=1)] = 1
+    which = rng.integers(0, len(corners), 400)
+    targets = (weights[:, :, None] * corners[which]).sum(axis=1) * 4 / weights.sum(axis=1)[:, None]
+    origins = rng.integers(-12, 12, (400, 3)).astype(float)
+    origins[::5] = corners[which[::5], 0] * 2 - corners[which[::5], 1]  # in the plane
+    directions = targets - 4 * origins
+    kept = directions.any(axis=1)
+    origins, directions = origins[kept], directions[kept]
+    hits = ray_intersect_scene(origins, directions, np.empty((0, 3)), [], triangles=corners)
+    assert (hits.index >= 0).mean() > 0.3
+    assert_hits_are_exact(hits, origins, directions, np.empty((0, 4)), corners)
+
+
+@pytest.mark.parametrize("method", ["textbook", "haines32"])
+def test_usual_methods_meet_triangles_too(path, method):
+    hits = ray_intersect_scene(
+        [[0, 0, 0], [0, 0, 0]], [[0, 0, -2], [0.1, 0.1, -2]], [[0, 0, -9]], [1], method,
+        triangles=[[[-1, -1, -4], [1, -1, -4], [0, 1, -4]]],
+    )  # fmt: skip
+    assert hits.index.tolist() == [1, 1]
+    np.testing.assert_allclose(hits.t, 2, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("triangles", "message"),
+    [
+        (np.zeros((2, 3)), "expected \\(m, 3, 3\\)"),
+        ([[[0, 0, 0], [1, 1, 1], [2, 2, 2]]], "number 0 lie on one line"),
+        ([[[0, 0, 0], [1, 1, np.nan], [2, 2, 2]]], "number 0 has a corner that is not finite"),
+    ],
+)
+def test_bad_triangles_are_refused(triangles, message):
+    with pytest.raises(ValueError, match=message):
+        ray_intersect_scene([[0, 0, 0]], [[0, 0, 1]], [[0, 0, 9]], [1], triangles=triangles)
