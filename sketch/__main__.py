@@ -16,7 +16,7 @@ from sketch.controls import View, keys_as_markdown
 from sketch.files import save_beside
 from sketch.scenes import NoScenesError, find_scenes
 from sketch.session import Session
-from sketch.sheet import TILE, contact_sheet
+from sketch.sheet import TILE, contact_sheet, gallery
 
 SCENES = Path(__file__).resolve().parent.parent / "scenes"
 SIZE, LARGEST = 640, 4096
@@ -34,6 +34,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         scenes, place = find_scenes(options.where)
         if options.sheet:
             return draw_sheet(scenes, options.size, options.sheet)
+        if options.gallery:
+            return draw_sheet(scenes, options.size, options.gallery, options.stage)
         if why := why_no_window():
             print(f"no window: {why}", file=sys.stderr)
             return draw_sheet(scenes, options.size)
@@ -66,9 +68,9 @@ def open_window(view: View, size: int) -> int:
     run_window(session)
 
 
-def draw_sheet(scenes: tuple[Path, ...], tile: int | None, out: Path | None = None) -> int:
-    """Draw the contact sheet and say where it is."""
-    sheet, errors = contact_sheet(scenes, tile or TILE)
+def draw_sheet(scenes: tuple[Path, ...], tile: int | None, out: Path | None = None, stage: str = "") -> int:
+    """Draw all scenes at every stage, or at one, and say where the picture is."""
+    sheet, errors = gallery(scenes, stage, tile or TILE) if stage else contact_sheet(scenes, tile or TILE)
     for error in errors:
         print(error, file=sys.stderr)
     try:
@@ -79,7 +81,7 @@ def draw_sheet(scenes: tuple[Path, ...], tile: int | None, out: Path | None = No
     except OSError as error:
         print(f"{out or 'contact-sheet.png'}: {error.strerror}", file=sys.stderr)
         return 1
-    print(f"every scene at every stage: {out}")
+    print(f"every scene at {f'stage {stage}' if stage else 'every stage'}: {out}")
     return 0
 
 
@@ -109,9 +111,10 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
         help="a folder of scenes (.cli), or one of its files to begin with (default: the project's scenes)",
     )  # fmt: skip
     parser.add_argument("--size", metavar="N", type=_size, help=f"draw N × N pixels (default: {SIZE})")
-    parser.add_argument("--stage", choices=STAGES, default="diffuse", help="the stage to begin with")
+    parser.add_argument("--stage", choices=STAGES, default="diffuse", help="the stage to begin with, or of the gallery")
     parser.add_argument("--method", choices=METHODS, default=CERTIFIED, help="the method to begin with")
     parser.add_argument("--sheet", metavar="OUT.png", type=Path, help="draw every scene at every stage into one PNG")
+    parser.add_argument("--gallery", metavar="OUT.png", type=Path, help="draw every scene at that stage into one PNG")
     parser.add_argument("--versions", action="store_true", help="print which Java is used, and why, and all versions")
     parser.add_argument("--keys", action="store_true", help="print what the keys do, as a markdown table")
     return parser.parse_args(arguments)

@@ -77,6 +77,19 @@ def test_a_sheet_can_be_asked_for(tmp_path, folder):
     assert (tmp_path / "all.png").exists()
 
 
+def test_a_gallery_holds_every_scene_at_one_stage(tmp_path, folder):
+    (folder / "broken.cli").write_text("sphrere 1 0 0 -4\n")
+    done = sketch(tmp_path, folder, "--size", 30, "--stage", "full", "--gallery", "all.png")
+    assert (done.returncode, done.stdout) == (0, "every scene at stage full: all.png\n")
+    assert "broken.cli:1:1" in done.stderr
+    sheet, scenes = load_png(tmp_path / "all.png"), find_scenes(folder)[0]
+    for place, path in enumerate(scenes):
+        if path.name != "broken.cli":
+            top, left = GAP + place // 4 * (30 + GAP + LABEL) + LABEL, GAP + place % 4 * (30 + GAP)
+            expected = render_scene(interpreter(path), "full", 30, 30)
+            assert np.array_equal(sheet[top : top + 30, left : left + 30], expected)
+
+
 def test_a_sheet_that_cannot_be_written_is_one_line(tmp_path, folder):
     done = sketch(tmp_path, folder, "--size", 20, "--sheet", "nowhere/all.png")
     assert done.returncode == 1
