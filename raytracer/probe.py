@@ -323,7 +323,7 @@ def _hit_or_miss(t: float) -> str:
 
 
 def _numbers(values: tuple[float, ...]) -> str:
-    return "(" + ", ".join(f"{value:.6g}" for value in values) + ")"
+    return "(" + ", ".join(f"{value + 0.0:.6g}" for value in values) + ")"  # + 0: no minus before a 0
 
 
 def _bytes(row: np.ndarray) -> tuple[int, int, int]:
