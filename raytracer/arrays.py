@@ -193,7 +193,7 @@ class Tree(NamedTuple):
 # ------------------------------------------------------------------------------------ what `raytracer.screen` shares
 
 
-FACET = 16  # numbers a triangle, of which some are to spare
+FACET = 24  # numbers a triangle, of which some are to spare
 
 
 class View(NamedTuple):
@@ -212,7 +212,7 @@ class View(NamedTuple):
     eye: tuple[float, float, float]
     balls: np.ndarray  # float64, flat: x, y, z, radius of each sphere, then `Facets.planes`
     material: np.ndarray  # int32: of each of those rows, a row of `Paints.colours`
-    facets: np.ndarray  # float64, flat: FACET numbers a triangle, `Facets.rows` and `distance`
+    facets: np.ndarray  # float64, flat: FACET numbers a triangle, see `screen.pack_facets`
     first_facet: int  # the number of the first triangle
 
 

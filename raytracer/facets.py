@@ -20,7 +20,7 @@ import numpy as np
 from raytracer import exact
 from raytracer.arrays import Facets, Grid, Nearest, Rays, TwofoldRays, View
 from raytracer.certified import FACET_ERROR, K_ERROR, LARGEST, SMALLEST, STEEP, Three, nearer
-from raytracer.scene import vector
+from raytracer.scene import Camera, vector
 from raytracer.twofold import Twofold, add, divide, dot, multiply, two_sum
 
 _NEXT = [1, 2, 0]
@@ -41,6 +41,18 @@ def see_facets(grid: Grid | View, kappa: float, origin: np.ndarray, corners: np.
     rows = np.where(known[:, None, None], vectors @ np.array([grid.u, grid.v, np.negative(grid.back)]).T, 0.0)
     distance = np.where(known, np.abs(volume) * (scale / extent)[:, 0], 0.0)
     return Facets(rows.reshape(len(a), 12), distance, planes, volume != 0.0)
+
+
+def true_zeros(origin: np.ndarray, corners: np.ndarray, camera: Camera) -> np.ndarray:
+    """What of e₁, e₂, e₃ of triangles (n, 3, 3) is 0 without any rounding: float64 (n, 3).
+
+    1 + 2 + 4 for what it is of across, of up, and besides. A difference is 0 only if it is so in truth, and a product
+    of such; so eᵢ is exactly 0 for rays through edges in the planes of an axis that go through the eye.
+    """
+    a, edges, i, j = corners - origin, corners[:, _NEXT] - corners, [1, 2, 0], [2, 0, 1]
+    side = ((a[..., i] == 0.0) | (edges[..., j] == 0.0)) & ((a[..., j] == 0.0) | (edges[..., i] == 0.0))
+    zero = (side[:, :, None] | (np.array([camera.u, camera.v, camera.w]) == 0.0)).all(axis=3)
+    return zero @ np.array([1.0, 2.0, 4.0])
 
 
 def planes_of(origin: np.ndarray, corners: np.ndarray) -> np.ndarray:

@@ -22,6 +22,7 @@ Cells = tuple[np.ndarray, np.ndarray]  # where each cell's list begins, int64; a
 
 _MOST = 512  # cells along an edge of the cube
 _KEPT = 16  # cubes and trees
+_LARGE = 8.0  # times the size that half of the shapes do not exceed
 _WIDER = 2.0**-46  # of a box, and of its distance from the origin
 
 _kept: dict[tuple[int, int, Vector | None], tuple[Spheres, Triangles, Cells | Tree]] = {}
@@ -67,10 +68,18 @@ def _tree(balls: np.ndarray, spheres: int, corners: np.ndarray, path: ModuleType
     high = np.concatenate([centres + radii, corners.max(axis=1, initial=-np.inf)])
     wider = _WIDER * (np.abs(low) + np.abs(high)).sum(axis=1, keepdims=True)
     about = np.column_stack([(low + high) / 2.0, (high - low).max(axis=1) / 2.0])
-    order = np.argsort(path.along_curve(about)) if len(about) else np.empty(0, np.int64)
+    order = _order(path.along_curve(about), about[:, 3]) if len(about) else np.empty(0, np.int64)
     tree: Tree = path.enclose(low - wider, high + wider, order, np.empty(0))
     ids = np.where(tree.ids >= spheres, tree.ids + (len(balls) - spheres), tree.ids)
     return tree._replace(ids=ids.astype(np.int32))
+
+
+def _order(along: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+    """Shapes along the curve, and those much larger than most in leaves of their own, which else all be as large."""
+    order = np.argsort(along)
+    large = (sizes > _LARGE * np.median(sizes))[order]
+    empty = np.full(-np.count_nonzero(~large) % 8, -1)
+    return np.concatenate([order[~large], empty, order[large]])
 
 
 def _light_cells(balls: np.ndarray, corners: np.ndarray, light: np.ndarray, path: ModuleType) -> Cells:

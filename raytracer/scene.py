@@ -189,6 +189,13 @@ class Triangles(_Table[Triangle]):
     materials: Materials = Materials()
 
     @cached_property
+    def corner_numbers(self) -> np.ndarray:
+        """A number for each corner, equal for equal ones: (n, 3) int64."""
+        corners = np.ascontiguousarray(self.vertices + 0.0).reshape(-1, 3)  # + 0: no two zeros
+        _, numbers = np.unique(corners.view("V24"), return_inverse=True)
+        return np.asarray(numbers).reshape(-1, 3)
+
+    @cached_property
     def largest(self) -> float:
         """The largest number among the corners, without its sign; 0 if there is none."""
         return float(np.abs(self.vertices).max(initial=0.0))

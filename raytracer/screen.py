@@ -44,12 +44,12 @@ from raytracer.arrays import (
 from raytracer.boxes import Lens, facet_boxes, make_lens
 from raytracer.camera import Raster, eye_grid, fine_columns, fine_rows
 from raytracer.eye import bundle_of, usable_spread
-from raytracer.facets import see_facets
+from raytracer.facets import see_facets, true_zeros
 from raytracer.full import corners_of, surfaces_of, terms_of
 from raytracer.lookup import light_cells, resolution_for, tree_of
 from raytracer.plan import Plan
 from raytracer.pool import cores, share
-from raytracer.scene import Colour, Materials, Scene
+from raytracer.scene import Colour, Materials, Scene, Triangles
 from raytracer.settle import Bundle, Index, Targets, known_in_integers, polish, settled
 from raytracer.shading import to_byte
 from raytracer.stages import light_from_eye
@@ -279,6 +279,10 @@ def open_screen(scene: Scene, raster: Raster, kernels: ModuleType, threads: int 
         lens, grid = make_lens(raster), eye_grid(raster)
         facets = see_facets(grid, usable_spread(raster), origin, corners) if len(corners) else None
         view = _view(raster, origin, balls, facets, material)
+        if facets is not None:
+            view = view._replace(
+                facets=pack_facets(facets, true_zeros(origin, corners, raster.camera), scene.triangles)
+            )
         boxes = _facet_boxes(lens, corners - origin, facets)
         bins, slow_ids = _sort(workspace, kernels, lens, view, len(scene.spheres), boxes, threads)
         slow, targets = _slow(lens, view, origin, balls, slow_ids, kernels)
@@ -362,19 +366,29 @@ def _desk(workspace: Workspace, kernels: ModuleType, worker: int) -> Desk:
 
 
 def _view(raster: Raster, origin: np.ndarray, balls: np.ndarray, facets: Facets | None, material: np.ndarray) -> View:
-    table, rows, first = balls.reshape(-1), _NO_SPHERES, len(balls)
+    table, first = balls.reshape(-1), len(balls)
     if facets is not None:
-        table, rows = np.concatenate([balls, facets.planes]).reshape(-1), np.zeros((len(facets.rows), FACET))
-        rows[:, :12], rows[:, 12] = facets.rows, facets.distance
-        for array in (table, rows):
-            array.flags.writeable = False  # to the kernels, arrays that can be written to are others
+        table = np.concatenate([balls, facets.planes]).reshape(-1)
+        table.flags.writeable = False  # to the kernels, arrays that can be written to are others
     grid, (x, y, z) = eye_grid(raster), origin.tolist()
     across = np.concatenate([grid.across, np.full(8, grid.across[-1])])
     up, a1, a0 = (np.append(rows, rows[-1]) for rows in (grid.up, grid.a1, grid.a0))
     return View(
         across, up, a1, a0, grid.a2, grid.u, grid.v, grid.back, grid.reach, usable_spread(raster), (x, y, z),
-        table, material, rows.reshape(-1), first,
+        table, material, _NO_SPHERES, first,
     )  # fmt: skip
+
+
+def pack_facets(facets: Facets, zeros: np.ndarray, triangles: Triangles) -> np.ndarray:
+    """What the kernels want to know of triangles, FACET numbers each, flat.
+
+    12 of `Facets.rows`, `distance`, 3 of `true_zeros`, 3 of `Triangles.corner_numbers`, and some to spare.
+    """
+    rows = np.zeros((len(facets.rows), FACET))
+    rows[:, :12], rows[:, 12], rows[:, 13:16], rows[:, 16:19] = (
+        facets.rows, facets.distance, zeros, triangles.corner_numbers,
+    )  # fmt: skip
+    return rows.reshape(-1)
 
 
 def _facet_boxes(lens: Lens, corners: np.ndarray, facets: Facets | None) -> np.ndarray:

@@ -137,6 +137,21 @@ def test_pictures_are_exact(path, scene_path):
         assert hits.t[y, x] == t or abs(hits.t[y, x] - t) <= np.spacing(t)
 
 
+@pytest.mark.parametrize("name", ["06_icosahedron_and_sphere", "11_star"])
+def test_of_triangles_that_share_an_edge_the_first_is_hit(path, name):
+    """Rays of the middle row and column go exactly through edges, and meet both at the same t."""
+    scene, size = interpreter(f"scenes/{name}.cli"), 128
+    raster, hits, (numbers, sizes) = (
+        make_raster(scene.camera, size, size),
+        eye_hits(scene, size, size),
+        exact_numbers(scene),
+    )
+    middle = [(x, size // 2) for x in range(size)] + [(size // 2, y) for y in range(size)]
+    assert len({hits.index[y, x] for x, y in middle}) > 8
+    for x, y in middle:
+        assert hits.index[y, x] == exact.nearest_of(numbers, *raster.whole_direction(x, y), sizes)[1]
+
+
 def test_rays_that_are_tangent_in_the_course_scenes():
     """√3 rounds down, and that much decides: 1/tan 30° in float64 arithmetic, which is larger, would hit."""
     scene = interpret("surface 1 1 1 0 0 0 0 0 0 1 0\nsphere 1 0 0 -4")

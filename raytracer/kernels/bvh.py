@@ -40,7 +40,7 @@ def build(balls, order):
 
 @compiled
 def enclose(shape_low, shape_high, order, spheres):
-    """The tree over boxes (n, 3) in an order; what `spheres` is in `Tree`, or nothing."""
+    """The tree over boxes (n, 3) in an order, in which −1 leaves a place empty; `spheres` as in `Tree`, or nothing."""
     n, eights = len(order), -(-len(order) // WIDTH)
     ids = np.full(eights * WIDTH, -1, np.int32)
     levels, counts = np.zeros(_DEEPEST, np.int64), np.zeros(_DEEPEST, np.int64)
@@ -56,9 +56,10 @@ def enclose(shape_low, shape_high, order, spheres):
     for place in range(n):
         i = order[place]
         ids[place] = i
-        for axis in range(3):
-            low[axis, place >> 3] = min(low[axis, place >> 3], shape_low[i, axis])
-            high[axis, place >> 3] = max(high[axis, place >> 3], shape_high[i, axis])
+        if i >= 0:
+            for axis in range(3):
+                low[axis, place >> 3] = min(low[axis, place >> 3], shape_low[i, axis])
+                high[axis, place >> 3] = max(high[axis, place >> 3], shape_high[i, axis])
     for level in range(1, depth):
         for node in range(counts[level - 1]):
             child, parent = levels[level - 1] + node, levels[level] + (node >> 3)

@@ -198,6 +198,16 @@ def bits_of(typing, mask):
 
 
 @intrinsic
+def mask_of(typing, bits):
+    """The mask whose lane i is bit i of a byte."""
+
+    def lower(context, builder, sig, args):
+        return builder.bitcast(args[0], ir.VectorType(_BIT, WIDTH))
+
+    return MASK(types.uint8), lower
+
+
+@intrinsic
 def same(typing, places):
     """Whether all lanes are equal to the first."""
 

@@ -16,7 +16,10 @@ import numpy as np
 
 from raytracer.arrays import FACET
 from raytracer.certified import (
+    FACET_ERROR,
     K_ERROR,
+    STEEP,
+    TIE,
     approach,
     approach_facet,
     arrive,
@@ -39,6 +42,7 @@ from raytracer.kernels.lanes import (
     load,
     load_low,
     load_pair,
+    mask_of,
     spread,
     spread_pair,
     store,
@@ -176,21 +180,61 @@ def _draw_facet(view, entry, tile, scratch):
         x, p, end = np.uint64(tile.left + start), np.uint64(line * STRIDE + start), np.uint64(line * STRIDE + stop)
         while p < end:
             across = load(view.across, x)
-            least, beside = beside_edges(
-                _linear(f, at, across, up), _linear(f, at + np.uint64(3), across, up),
-                _linear(f, at + np.uint64(6), across, up),
-            )  # fmt: skip
+            first, second = _linear(f, at, across, up), _linear(f, at + np.uint64(3), across, up)
+            third = _linear(f, at + np.uint64(6), across, up)
+            least, beside = beside_edges(first, second, third)
             if not all_of(beside):
                 best, slope = load(scratch.k, p), _linear(f, at + np.uint64(9), across, up)
                 a = (across * view.a2 + a1) * across + a0
                 k, wins, doubt = approach_facet(least, slope, f[at + np.uint64(12)], a, best)
-                _keep(scratch, p, wins, k, best, i)
                 if any_of(doubt):
-                    _note(scratch.doubt, p, bits_of(doubt))
-                    doubts = True
+                    sides = first > FACET_ERROR, second > FACET_ERROR, third > FACET_ERROR
+                    tie = abs(k - best) <= TIE * k
+                    settled, twins = _on_edges(view, f, at, across, up, sides, doubt & (slope > STEEP), tie, scratch, p)
+                    doubt, wins = doubt & ~settled, wins & ~twins
+                    if any_of(doubt):
+                        _note(scratch.doubt, p, bits_of(doubt))
+                        doubts = True
+                _keep(scratch, p, wins, k, best, i)
             x += np.uint64(WIDTH)
             p += np.uint64(WIDTH)
     return doubts
+
+
+@inlined
+def _on_edges(view, f, at, across, up, sides, doubt, tie, scratch, p):
+    """Of pixels whose ray may go through an edge: those of which that is certain, and what comes of it.
+
+    And those of them where the triangle that was met already has that edge too: both are met at the same t, and the
+    first of the file, which is drawn first, stays.
+    """
+    settled, twins, place = doubt & ~tie, across < -np.inf, at + np.uint64(13)
+    for edge in range(3):
+        zero = np.int64(f[place + np.uint64(edge)])
+        on = (((across == 0.0) | (zero & 1 > 0)) & ((up == 0.0) | (zero & 2 > 0))) & (zero & 4 > 0)
+        settled = settled & (sides[edge] | on)
+        others = sides[(edge + 1) % 3] & sides[(edge + 2) % 3]
+        shared = doubt & tie & on & others
+        if any_of(shared):
+            bits = bits_of(shared)
+            for lane in range(WIDTH):
+                if bits >> lane & 1 and not _has_edge(view, f, scratch.index[p + np.uint64(lane)], at, edge):
+                    bits ^= np.uint8(1 << lane)
+            twins = twins | mask_of(bits)
+    return settled | twins, twins
+
+
+@inlined
+def _has_edge(view, f, j, at, edge):
+    """Whether shape j is a triangle that has the same two corners."""
+    if j < view.first_facet:
+        return False
+    corners, found = np.uint64(FACET) * np.uint64(j - view.first_facet) + np.uint64(16), 0
+    for corner in (f[at + np.uint64(16 + edge)], f[at + np.uint64(16 + (edge + 1) % 3)]):
+        for k in range(np.uint64(3)):
+            if f[corners + k] == corner:
+                found += 1
+    return found == 2
 
 
 @inlined
