@@ -147,7 +147,7 @@ def test_of_triangles_that_share_an_edge_the_first_is_hit(path, name):
         exact_numbers(scene),
     )
     middle = [(x, size // 2) for x in range(size)] + [(size // 2, y) for y in range(size)]
-    assert len({hits.index[y, x] for x, y in middle}) > 8
+    assert len({hits.index[y, x] for x, y in middle}) > 5
     for x, y in middle:
         assert hits.index[y, x] == exact.nearest_of(numbers, *raster.whole_direction(x, y), sizes)[1]
 
