@@ -16,6 +16,7 @@ from raytracer.methods import CERTIFIED, METHODS, check_method
 from raytracer.scene import Light, Scene
 from raytracer.stages import LIGHT_RANGE, STAGES, Stage
 
+_COST_OF_A_BOUNCE = 4  # of a test of a ray that starts on a shape, in tests of one that starts at the eye
 _TESTS_A_LIGHT = 20  # what shading by a light costs, in tests of a ray against a sphere
 
 
@@ -45,7 +46,17 @@ class Plan:
     @cached_property
     def path(self) -> ModuleType:
         """Who traces: `raytracer.plain` or `raytracer.kernels`."""
-        return self.forced or backend.loaded() or self.eye.path
+        chosen = self.forced or backend.loaded() or self.eye.path
+        if chosen is plain and self.forced is None and self.stage.throws_on:
+            return backend.choose(self._tests_beyond_the_eye, 0)
+        return chosen
+
+    @property
+    def _tests_beyond_the_eye(self) -> int:
+        """About how many tests of a ray against a shape it takes to throw light on, where every shape is tested."""
+        terms, lights = terms_of(self.scene, self.lights), len(self.lights)
+        rays = lights * terms.shadows + terms.mirrors * (1 + lights * terms.shadows)
+        return _COST_OF_A_BOUNCE * self.raster.width * self.raster.height * len(self.scene) * rays
 
     @property
     def path_name(self) -> str:
