@@ -12,9 +12,10 @@ from importlib.util import find_spec
 from threading import Lock
 from types import ModuleType
 
-from raytracer import plain
+from raytracer import machine_code, plain
 
 _PRICE = 0.5  # seconds to load the compiler and what it has compiled before
+_PRICE_OF_COMPILING = 6.0  # seconds, if it has compiled nothing before
 _SECONDS_A_TEST, _SECONDS_A_LOOP = 1e-7, 3e-4  # numpy: a ray against a sphere; a sphere against a block of rays
 
 _loading, _counting = Lock(), Lock()
@@ -42,14 +43,18 @@ def loaded() -> ModuleType | None:
     return _loaded
 
 
-def choose(tests: int, loops: int) -> ModuleType:
-    """The path for so many tests of a ray against a sphere, in so many loops over rays."""
+def choose(tests: int, loops: int, kernel: str = "") -> ModuleType:
+    """The path for so many tests of a ray against a shape, in so many loops over rays.
+
+    Loading costs more if a kernel that is wanted has never been compiled.
+    """
     global _spent
     if _loaded is not None:
         return _loaded
     seconds = tests * _SECONDS_A_TEST + loops * _SECONDS_A_LOOP
     with _counting:
-        rent = _spent + seconds <= _PRICE
+        price = _PRICE if not kernel or machine_code.is_kept(kernel) else _PRICE_OF_COMPILING
+        rent = _spent + seconds <= price
         if rent:
             _spent += seconds
     return plain if rent else load()

@@ -16,7 +16,8 @@ from raytracer.methods import CERTIFIED, METHODS, check_method
 from raytracer.scene import Light, Scene
 from raytracer.stages import LIGHT_RANGE, STAGES, Stage
 
-_COST_OF_A_BOUNCE = 4  # of a test of a ray that starts on a shape, in tests of one that starts at the eye
+_REFLECTIONS = 4  # that follow each other where there are mirrors, about
+_TESTS_FOR_ONE = 4  # tests of rays that start on a shape, many together, in the time of one of an eye ray
 _TESTS_A_LIGHT = 20  # what shading by a light costs, in tests of a ray against a sphere
 
 
@@ -48,15 +49,16 @@ class Plan:
         """Who traces: `raytracer.plain` or `raytracer.kernels`."""
         chosen = self.forced or backend.loaded() or self.eye.path
         if chosen is plain and self.forced is None and self.stage.throws_on:
-            return backend.choose(self._tests_beyond_the_eye, 0)
+            return backend.choose(self._tests_beyond_the_eye, 0, self.stage.painter)
         return chosen
 
     @property
     def _tests_beyond_the_eye(self) -> int:
         """About how many tests of a ray against a shape it takes to throw light on, where every shape is tested."""
         terms, lights = terms_of(self.scene, self.lights), len(self.lights)
-        rays = lights * terms.shadows + terms.mirrors * (1 + lights * terms.shadows)
-        return _COST_OF_A_BOUNCE * self.raster.width * self.raster.height * len(self.scene) * rays
+        shadow_rays = lights * terms.shadows
+        rays = shadow_rays + _REFLECTIONS * terms.mirrors * (1 + shadow_rays)
+        return self.raster.width * self.raster.height * len(self.scene) * rays // _TESTS_FOR_ONE
 
     @property
     def path_name(self) -> str:

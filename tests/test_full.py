@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from test_trace import PATHS, exact_numbers
 
-from raytracer import backend, exact, eye_hits, interpreter, render_scene
+from raytracer import backend, exact, eye_hits, interpreter, machine_code, render_scene
 from raytracer.camera import make_raster
 from raytracer.full import terms_of
 from raytracer.interpreter import interpret
@@ -173,3 +173,15 @@ def test_a_light_inside_a_sphere_lights_it_from_within_only(path):
     dark = draw(make_plan(outside, "full", 40, 40, path=PATHS[path]))
     hits = eye_hits(outside, 40, 40).index
     assert (dark[hits >= 0] == math.floor(255 * 0.1 + 0.5)).all()  # ambient only: N·L < 0, and the wall is between
+
+
+def test_without_machine_code_numpy_is_used_for_longer(monkeypatch):
+    monkeypatch.setattr(backend, "_loaded", None)
+    monkeypatch.setattr(backend, "load", lambda: PATHS["compiled"])
+    plan = make_plan(interpreter("scenes/11_star.cli"), "full", 320, 320)
+    chosen = []
+    for kept in (True, False):
+        monkeypatch.setattr(backend, "_spent", 0.0)
+        monkeypatch.setattr(machine_code, "is_kept", lambda kernel, kept=kept: kept and kernel == "paint_full")
+        chosen.append(replace(plan).path)
+    assert chosen == [PATHS["compiled"], PATHS["numpy"]]

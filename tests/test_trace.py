@@ -29,7 +29,7 @@ def path(request, monkeypatch):
 
 
 def trace_on(path, monkeypatch):
-    monkeypatch.setattr(backend, "choose", lambda tests, loops: path)
+    monkeypatch.setattr(backend, "choose", lambda *_: path)
     monkeypatch.setattr(backend, "loaded", lambda: path)
 
 

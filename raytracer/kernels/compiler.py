@@ -3,28 +3,23 @@
 No fast-math flag: contracting a·a − b·b turns it into noise, reassociation breaks every error-free sum, and assuming
 that there is no NaN or infinity deletes the test for a miss. Division by zero gives what IEEE 754 says, no exception.
 
-The arithmetic that numpy runs on arrays is compiled here for single numbers, from the same source. numba's cache looks
-at the file of a kernel only, not at the files it calls into; so the cache lies in a folder named after all of these.
+The arithmetic that numpy runs on arrays is compiled here for single numbers, from the same source. Where machine code
+is kept, `machine_code` says.
 """
 
 from __future__ import annotations
 
-import hashlib
 import math
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
-from getpass import getuser
-from pathlib import Path
-from tempfile import gettempdir
 from types import FunctionType, ModuleType
 
 import numba
 from llvmlite.binding import get_host_cpu_features
 from numba.extending import overload, register_jitable
 
-from raytracer import bounce, boxes, certified, methods, shading, twofold
+from raytracer import bounce, boxes, certified, machine_code, methods, shading, twofold
 from raytracer.kernels.lanes import Mask, blend, fused
 
 
@@ -72,28 +67,7 @@ for _module in _SOURCES:
     _compile_calls_into(_module)
 
 
-def _cache_folder() -> Path | None:
-    """Where machine code is kept: a folder named after the sources, in the first place that can be written to."""
-    here = Path(__file__).parent
-    sources = [Path(module.__file__ or "") for module in _SOURCES] + sorted(here.glob("*.py"))
-    digest = hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()[:16]
-    places = (
-        here / "__pycache__",
-        Path("~/.cache/raytracer").expanduser(),
-        Path(gettempdir()) / f"raytracer-{getuser()}",
-    )
-    return next((place / digest for place in places if _can_write(place / digest)), None)
-
-
-def _can_write(folder: Path) -> bool:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError:
-        return False
-    return os.access(folder, os.W_OK)
-
-
-_CACHE = _cache_folder()
+_CACHE = machine_code.folder()
 compiled = partial(numba.njit, cache=_CACHE is not None, nogil=True, error_model="numpy")
 
 # For kernels that make no arrays: without counting who still uses those that they are given.
