@@ -17,7 +17,7 @@ from raytracer.scene import Light, Scene
 from raytracer.stages import LIGHT_RANGE, STAGES, Stage
 
 _REFLECTIONS = 4  # that follow each other where there are mirrors, about
-_TESTS_FOR_ONE = 4  # tests of rays that start on a shape, many together, in the time of one of an eye ray
+_TESTS_FOR_ONE = 8  # tests of rays that start on a shape, many together, in the time of one of an eye ray
 _TESTS_A_LIGHT = 20  # what shading by a light costs, in tests of a ray against a sphere
 
 
