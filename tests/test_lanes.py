@@ -101,3 +101,51 @@ def test_boxes_and_pixels_are_written_in_rows():
     assert (four[4:36].reshape(8, 4)[:, 3] == 2).all()
     assert (four[:4] == 2).all()
     assert (four[36:] == 2).all()
+
+
+def test_pairs_of_rows():
+    numbers, places = np.arange(40.0), np.arange(40, dtype=np.int32)
+
+    @borrowing
+    def run(numbers, places, out):
+        k.store_pair(out, 2, 10, k.load_pair(numbers, 3, 20))
+        k.store(out, np.uint64(16), k.spread_pair(1.5, -2.5))
+        return k.largest_of(k.load_pair(places, 1, 30))
+
+    out = np.zeros(24)
+    assert run(numbers, places, out) == 33
+    assert out.tolist() == [0, 0, 3, 4, 5, 6, 0, 0, 0, 0, 20, 21, 22, 23, 0, 0, *[1.5] * 4, *[-2.5] * 4]
+
+
+def test_places_are_compared_and_picked():
+    words = np.arange(8, dtype=np.uint64) * 3 + (np.uint64(9) << np.uint64(32))
+
+    @borrowing
+    def run(words, a, out):
+        low = k.load_low(words, 0)
+        k.store(out, 0, low)
+        k.store(out, EIGHT, k.spread(np.int32(3)) * low + k.spread(np.int32(1)))
+        k.store(out, np.uint64(16), k.whole(k.load(a, 0)))
+        high = k.at_least(low, 12)
+        return (
+            k.bits_of(k.equal_to(low, 9)),
+            k.bits_of(high),
+            k.first_where(high, low),
+            k.bits_of(k.mask_of(np.uint8(90))),
+        )
+
+    out = np.zeros(24, np.int32)
+    whole = np.array([0, -1, 2, 3.9, 1e6, 5, -6.5, 7])
+    assert run(words, whole, out) == (1 << 3, 0b11110000, 12, 90)
+    assert out.tolist() == [*range(0, 24, 3), *range(1, 72, 9), *whole.astype(int).tolist()]
+
+
+def test_powers_and_the_smallest():
+    @borrowing
+    def run(a, b, out):
+        k.store(out, 0, k.raised(k.load(a, 0), k.load(b, 0)))
+        return k.smallest_of(k.load(b, 0))
+
+    a, b, out = np.linspace(0, 1, 8), np.array([0, 1, 2, 0.5, -1, 20, 2.5, 3]), np.empty(8)
+    assert run(a, b, out) == -1
+    np.testing.assert_allclose(out, a**b, rtol=1e-15)
