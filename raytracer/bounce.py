@@ -50,6 +50,14 @@ def meet_sphere(
     o: Three, d: Three, a: Number, over_a: Number, radius: Number, size: Number, own: Number, from_outside: Number
 ) -> Number:
     """t of the first hit, +inf for none. `from_outside`: where P is on this sphere, the ray came from outside."""
+    hit, h, c, disc = hits_sphere(o, d, a, over_a, radius, size, own, from_outside)
+    return select(hit, sphere_hit_at(h, c, disc, over_a), np.inf)
+
+
+def hits_sphere(
+    o: Three, d: Three, a: Number, over_a: Number, radius: Number, size: Number, own: Number, from_outside: Number
+) -> tuple[Number, Number, Number, Number]:
+    """What `meet_sphere` asks first: whether the ray hits; and h, c and h² − a·c for `sphere_hit_at`."""
     h, square, r2 = (
         inner(d[0], d[1], d[2], o[0], o[1], o[2]),
         inner(o[0], o[1], o[2], o[0], o[1], o[2]),
@@ -58,9 +66,14 @@ def meet_sphere(
     c = square - r2
     c = select(own | (abs(c) <= LEAVING * (square + r2 + radius * size)), 0.0, c)
     half, on = r2 - _beside(h * over_a, o, d), c == 0.0
-    q = abs(h) + select(on, abs(h), np.sqrt(a * half))  # √(h² − a·c), which for c = 0 is not to be rounded
-    t = select((h < 0.0) & (c <= 0.0), q * over_a, abs(c) / q)
-    return select((on | (half >= 0.0)) & ((h < 0.0) | (c < 0.0)) & ~(own & from_outside), t, np.inf)
+    hit = (on | (half >= 0.0)) & ((h < 0.0) | (c < 0.0)) & ~(own & from_outside)
+    return hit, h, c, select(on, h * h, a * half)
+
+
+def sphere_hit_at(h: Number, c: Number, disc: Number, over_a: Number) -> Number:
+    """t of a hit: from c = 0 exactly −2h/a but for rounding."""
+    q = abs(h) + select(c == 0.0, abs(h), np.sqrt(disc))
+    return select((h < 0.0) & (c <= 0.0), q * over_a, abs(c) / q)
 
 
 def _beside(s: Number, o: Three, d: Three) -> Number:

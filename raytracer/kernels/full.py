@@ -13,10 +13,11 @@ import numpy as np
 from raytracer.bounce import (
     MOST_REFLECTIONS,
     blocks_sphere,
+    hits_sphere,
     land_again,
-    meet_sphere,
     plane_ahead,
     reflected,
+    sphere_hit_at,
     within_edges,
 )
 from raytracer.certified import inner
@@ -216,7 +217,11 @@ def _meet(view, paints, j, p, d, a, over_a, where, size, from_outside):
     x, y, z, w = _row(view.balls, row)
     if j < view.first_facet:
         o = p[0] + (eye[0] - x), p[1] + (eye[1] - y), p[2] + (eye[2] - z)
-        return meet_sphere(o, d, a, over_a, w, size, own, from_outside)
+        hit, h, c, disc = hits_sphere(o, d, a, over_a, w, size, own, from_outside)
+        t = spread(np.inf)
+        if any_of(hit):
+            t = select(hit, sphere_hit_at(h, c, disc, over_a), np.inf)
+        return t
     corners, at = paints.corners, np.uint64(CORNERS) * np.uint64(j - view.first_facet)
     over, under = plane_ahead(p, d, (x, y, z, w), corners[at + np.uint64(9)], size, own)
     ahead = over > 0.0
