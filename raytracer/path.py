@@ -45,6 +45,11 @@ class LightRay:
     stop: Vector  # where that shape is met; else the light's position
     adds: Colour  # to the pixel's colour
 
+    @property
+    def is_behind(self) -> bool:
+        """Whether the light shines on the other side of the surface."""
+        return self.blocker is None and not self.cosine > 0.0 and not any(self.adds)
+
 
 @dataclass(frozen=True)
 class Hit:

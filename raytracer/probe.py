@@ -374,7 +374,7 @@ def _answer(light: LightRay, hit: Hit, in_short: bool) -> str:
     cosines = f": N·L = {light.cosine:.6g}{shiny}"
     if light.blocker is not None:
         return f" is blocked by shape {light.blocker}" + ("" if in_short else f" at {_numbers(light.stop)}{cosines}")
-    if light.cosine <= 0.0 and not any(light.adds):
+    if light.is_behind:
         return " shines on the other side" + ("" if in_short else cosines)
     return f"{cosines} {_adds(light.adds, in_short)}"
 

@@ -3,8 +3,6 @@
 from itertools import pairwise
 
 import numpy as np
-import pytest
-from conftest import COURSE, SCENES
 
 from raytracer import Sphere, interpreter, probe_pixel, render_scene
 from raytracer.bounce import MOST_REFLECTIONS
@@ -13,8 +11,8 @@ from raytracer.interpreter import interpret
 
 WIDTH, HEIGHT = 60, 44
 PIXELS = [(x, y) for x in range(0, WIDTH, 7) for y in range(0, HEIGHT, 5)]
-DEEP = SCENES / "10_reflections_in_reflections.cli"
-MIRRORS = SCENES / "09_mirror_spheres.cli"
+DEEP = "scenes/10_reflections_in_reflections.cli"
+MIRRORS = "scenes/09_mirror_spheres.cli"
 
 
 def rays_of(scene, pixels=PIXELS):
@@ -71,9 +69,8 @@ def test_shares_are_products_and_rays_begin_where_the_one_before_ends():
     assert longest == MOST_REFLECTIONS + 1
 
 
-@pytest.mark.parametrize("path", COURSE, ids=lambda path: path.stem)
-def test_a_blocker_lies_between_and_adds_nothing(path):
-    for hit, light in light_rays_of(interpreter(path)):
+def test_a_blocker_lies_between_and_adds_nothing(course_scene_path):
+    for hit, light in light_rays_of(interpreter(course_scene_path)):
         whole, part = np.subtract(light.position, hit.point), np.subtract(light.stop, hit.point)
         if light.blocker is None:
             assert light.stop == light.position
@@ -82,7 +79,7 @@ def test_a_blocker_lies_between_and_adds_nothing(path):
         along = part @ whole / (whole @ whole)
         assert 0 < along < 1
         np.testing.assert_allclose(part, along * whole, atol=1e-12)
-        assert off_surface(interpreter(path).shape(light.blocker), light.stop) < 1e-9
+        assert off_surface(interpreter(course_scene_path).shape(light.blocker), light.stop) < 1e-9
 
 
 def off_surface(shape, point):
@@ -94,9 +91,8 @@ def off_surface(shape, point):
     return abs((point - a) @ normal) / np.linalg.norm(normal)
 
 
-@pytest.mark.parametrize("path", COURSE, ids=lambda path: path.stem)
-def test_no_shape_blocks_itself_on_the_side_of_the_light(path):
-    for hit, light in light_rays_of(interpreter(path)):
+def test_no_shape_blocks_itself_on_the_side_of_the_light(course_scene_path):
+    for hit, light in light_rays_of(interpreter(course_scene_path)):
         np.testing.assert_allclose(np.linalg.norm(hit.normal), 1)
         to_light = np.subtract(light.position, hit.point)
         np.testing.assert_allclose(light.cosine, hit.normal @ to_light / np.linalg.norm(to_light), atol=1e-9)
