@@ -234,6 +234,21 @@ def inverse_frame(camera: Camera) -> tuple[list[list[float]], float] | None:
     return (rows, magnification) if magnification < _SKEWED else None
 
 
+def seen_at(raster: Raster, offsets: np.ndarray) -> np.ndarray | None:
+    """Where a picture shows what lies in these directions from the eye, (n, 3): s·x, s·y and s, in column x and row y.
+
+    Rays go through whole x and y; s is above 0 ahead of the eye and below 0 behind it. None for a frame that is so flat
+    that this is lost in rounding.
+    """
+    inverse = inverse_frame(raster.camera)
+    if inverse is None:
+        return None
+    across, up, ahead = np.array(inverse[0]) @ offsets.T
+    shift = SAMPLINGS[raster.sampling]
+    x, y = raster.height * across + (raster.width - shift) * ahead, (raster.height - shift) * ahead - raster.height * up
+    return np.stack([x / 2, y / 2, ahead], axis=1)
+
+
 def spread(raster: Raster) -> float:
     """κ: no ray of the picture has a reach of more than κ times its length; +inf where that is not known.
 

@@ -27,6 +27,7 @@ from raytracer.certified import inner
 from raytracer.facets import planes_of
 from raytracer.scene import Light, Scene
 from raytracer.shading import Four, Three, cosine, highlight, land_on_any, raised_to_whole, towards
+from raytracer.twofold import Number
 from raytracer.units import scene_units
 
 CORNERS = 12  # numbers a triangle: its corners, how far away they are, and some to spare
@@ -81,6 +82,11 @@ class World:
     def _units(self) -> tuple[int, np.ndarray, np.ndarray, np.ndarray]:
         return scene_units(self.scene)
 
+    @property
+    def unit(self) -> int:
+        """Lengths are counted in 2**unit of the scene's."""
+        return self._units[0]
+
     @cached_property
     def eye(self) -> Three:
         x, y, z = self._units[1].tolist()
@@ -101,6 +107,10 @@ class World:
         return corners_of(eye, corners)
 
     @cached_property
+    def surfaces(self) -> np.ndarray:
+        return surfaces_of(self.scene)
+
+    @cached_property
     def terms(self) -> Terms:
         return terms_of(self.scene, self.scene.lights if self.lights else ())
 
@@ -117,7 +127,7 @@ class World:
         """The colours that come along eye rays D from hits at t on shapes `where`: (n, 3)."""
         p, n, radius = land_on_any(t, d, self.eye, self.row_of(where), where >= self.first_facet)
         colours, weight, which = np.zeros((len(t), 3)), np.ones(len(t)), np.arange(len(t))
-        surfaces, material = surfaces_of(self.scene), self.scene.numbered[1]
+        surfaces, material = self.surfaces, self.scene.numbered[1]
         for bounce in range(MOST_REFLECTIONS + 1):
             of = 3 * material[where].astype(np.int64)
             ambient = surfaces[of + 1]
@@ -149,21 +159,25 @@ class World:
         shiny: np.ndarray,
     ) -> np.ndarray:
         """What all lights add: (n, 3)."""
-        total, spark = np.zeros((len(where), 3)), np.zeros(len(where))
-        over, size = 1.0 / np.sqrt(inner(*d, *d)), abs(p[0]) + abs(p[1]) + abs(p[2])
-        unit = d[0] * over, d[1] * over, d[2] * over
+        total, size, unit = np.zeros((len(where), 3)), reach(p), unit_of(d)
         for place, colour in self.lights:
-            facing, square = towards(p, n, place)
-            shine = cosine(facing, square, radius)
-            if self.terms.specular:
-                spark = highlight(p, n, radius, place, square, unit)
-                spark = _raised(spark, diffuse[:, 3], self.terms.bits)
+            shine, spark = self.answers(p, n, radius, unit, place, diffuse[:, 3])
             lit = (shine > 0.0) | (spark > 0.0)
             if self.terms.shadows and lit.any():
                 lit[lit] = ~self._blocked(_some(p, lit), place, where[lit], size[lit])
             added = diffuse[:, :3] * shine[:, None] + shiny[:, :3] * spark[:, None]
             total += np.where(lit[:, None], np.array(colour) * added, 0.0)
         return total
+
+    def answers(
+        self, p: Three, n: Three, radius: np.ndarray, unit: Three, place: Three, power: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """max(0, N·L) and max(0, H·N)^power of a light at points where unit rays arrived: (n,), (n,)."""
+        facing, square = towards(p, n, place)
+        shine = cosine(facing, square, radius)
+        if not self.terms.specular:
+            return shine, np.zeros(len(power))
+        return shine, _raised(highlight(p, n, radius, place, square, unit), power, self.terms.bits)
 
     def _blocked(self, p: Three, light: Three, where: np.ndarray, size: np.ndarray) -> np.ndarray:
         """Whether something stands between P and a light: bool (n,)."""
@@ -173,7 +187,7 @@ class World:
         for j in self.shapes:
             own, row = where == j, self.rows[j]
             if j < self.first_facet:
-                blocked |= blocks_sphere(self._away(p, row), d, a, over_a, row[3], size, own)
+                blocked |= blocks_sphere(self.away(p, row), d, a, over_a, row[3], size, own)
             else:
                 over, under = plane_ahead(p, d, tuple(row), self.corners[j - self.first_facet, 9], size, own)
                 between = (over > 0.0) & (over < under)
@@ -186,12 +200,12 @@ class World:
     ) -> tuple[np.ndarray, np.ndarray]:
         """What rays from P hit first: t and the numbers of shapes, −1 for none."""
         best, index = np.full(len(where), np.inf), np.full(len(where), -1, np.int32)
-        a, size = inner(*d, *d), abs(p[0]) + abs(p[1]) + abs(p[2])
+        a, size = inner(*d, *d), reach(p)
         over_a = 1.0 / a
         for j in self.shapes:
             own, row = where == j, self.rows[j]
             if j < self.first_facet:
-                t = meet_sphere(self._away(p, row), d, a, over_a, row[3], size, own, from_outside)
+                t = meet_sphere(self.away(p, row), d, a, over_a, row[3], size, own, from_outside)
                 closer = t < best
             else:
                 over, under = plane_ahead(p, d, tuple(row), self.corners[j - self.first_facet, 9], size, own)
@@ -202,8 +216,8 @@ class World:
             best, index = np.where(closer, t, best), np.where(closer, np.int32(j), index)
         return best, index
 
-    def _away(self, p: Three, row: np.ndarray) -> Three:
-        """P − C."""
+    def away(self, p: Three, row: np.ndarray | Three) -> Three:
+        """P − C, for a sphere's row, or for the columns of many."""
         eye = self.eye
         return p[0] + (eye[0] - row[0]), p[1] + (eye[1] - row[1]), p[2] + (eye[2] - row[2])
 
@@ -211,6 +225,16 @@ class World:
         ax, ay, az, bx, by, bz, cx, cy, cz, *_ = self.corners[j - self.first_facet].tolist()
         within: np.ndarray = within_edges(p, d, (ax, ay, az), (bx, by, bz), (cx, cy, cz))
         return within
+
+
+def reach(p: Three) -> Number:
+    """At least |P|."""
+    return abs(p[0]) + abs(p[1]) + abs(p[2])
+
+
+def unit_of(d: Three) -> Three:
+    over = 1.0 / np.sqrt(inner(*d, *d))
+    return d[0] * over, d[1] * over, d[2] * over
 
 
 def _some(vectors: Three, which: np.ndarray) -> Three:

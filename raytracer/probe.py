@@ -20,6 +20,7 @@ from raytracer.eye import Eye, usable_spread
 from raytracer.facets import see_facets
 from raytracer.image import to_bytes
 from raytracer.methods import CERTIFIED, METHODS
+from raytracer.path import Hit, LightRay, Ray, rays_of
 from raytracer.plan import Plan, make_plan
 from raytracer.render import block_of, open_tracer, whole_of
 from raytracer.scene import Colour, Scene, Shape, Sphere, Triangle, Vector, vector
@@ -27,6 +28,7 @@ from raytracer.stages import Block
 
 _DIGITS = 17  # of a float64
 _MOST_SHAPES = 8
+_MOST_REFLECTIONS, _MOST_LIGHTS = 2, 3  # that are told one by one where the story is short
 
 
 @dataclass(frozen=True)
@@ -93,12 +95,16 @@ class Pixel:
     meetings: tuple[Meeting, ...]  # the shapes whose box of pixels this one lies in, nearest first
     point: Vector | None
     normal: Vector | None
-    lights: tuple[Lighting, ...]
+    lights: tuple[Lighting, ...]  # at a stage that looks no farther than the hit
+    rays: tuple[Ray, ...]  # at a stage that follows the light on: the eye's ray, and those off mirrors, in their order
     colour: Colour  # as the stage computed it, neither clipped nor rounded
     rgb: tuple[int, int, int]  # as it is drawn
 
     def lines(self) -> list[str]:
-        """The story in short, a line each."""
+        """The story in short, a line each; indented lines belong to a mirrored ray."""
+        return self._lines(in_short=True)
+
+    def _lines(self, in_short: bool) -> list[str]:
         story = [f"pixel {self.x} {self.y}", f"ray from {_numbers(self.eye)} along {_numbers(self.direction)}"]
         if self.shape is None:
             story += ["hits nothing"]
@@ -111,12 +117,13 @@ class Pixel:
             story += [f"point {_numbers(self.point)}", f"normal {_numbers(self.normal)}"]
         for light in self.lights:
             story += [f"light {_numbers(light.position)}: N·L = {light.cosine:.6g} adds {_numbers(light.colour)}"]
+        story += _tree(self.rays, in_short)
         return [*story, f"{self.stage}: colour {_numbers(self.colour)}", f"drawn as {_numbers(self.rgb)}"]
 
     def story(self) -> list[str]:
-        """The whole story: the exact ray, and every near shape's quadratic as computed and in truth."""
+        """The whole story: the exact ray, all after it, and every near shape's quadratic, as computed and in truth."""
         ray = ", ".join(str(component) for component in self.exact_direction)
-        first, *rest = self.lines()
+        first, *rest = self._lines(in_short=False)
         meetings = [line for meeting in self.meetings for line in meeting.lines()]
         return [
             f"{first} of {self.width} x {self.height}, method {self.method}",
@@ -173,7 +180,8 @@ def probe_pixel(
     row = slice(y, y + 1)
     rays, hits = directions(eye_grid(plan.raster), row), plan.eye.hits(row, polished=True)
     block = Block(scene, plan.raster, row, hits, scene.lights)
-    colour = _colour(plan, row)[x]
+    shown = _shown(plan, row)
+    colour = plan.stage.colours(shown)[0, x]
     index, point, normal = int(hits.index[0, x]), None, None
     if index >= 0:
         k = int(np.count_nonzero(block.hit[0, :x]))
@@ -182,22 +190,22 @@ def probe_pixel(
     others = [m.true_t if method == CERTIFIED else m.t for m in meetings if m.index != index]
     lead = min(others, default=np.inf) - float(hits.t[0, x]) if index >= 0 else np.inf
     certainty = plan.eye.level(x, y) if method == CERTIFIED else ""
+    direction, follows = vector(np.array(rays)[:, 0, x]), plan.stage.throws_on
     return Pixel(
-        x, y, width, height, stage, method, scene.camera.eye, vector(np.array(rays)[:, 0, x]),
+        x, y, width, height, stage, method, scene.camera.eye, direction,
         plan.raster.exact_direction(x, y), index, scene.shape(index) if index >= 0 else None, float(hits.t[0, x]),
         certainty, lead if np.isfinite(lead) else None, meetings, point, normal,
-        tuple(_lightings(block, k)) if index >= 0 and plan.stage.needs_lights else (),
+        tuple(_lightings(block, k)) if index >= 0 and plan.stage.needs_lights and not follows else (),
+        rays_of(shown, x, direction) if follows else (),
         vector(colour), _bytes(to_bytes(colour)),
     )  # fmt: skip
 
 
-@np.errstate(all="ignore")
-def _colour(plan: Plan, row: slice) -> np.ndarray:
-    """The stage's colours of one row, (width, 3)."""
+def _shown(plan: Plan, row: slice) -> Block:
+    """One row as the stage is given it when it draws."""
     with open_tracer(plan) as tracer:
         whole = whole_of(plan, tracer)
-    colours: np.ndarray = plan.stage.colours(block_of(plan, plan.eye, row, whole=whole))[0]
-    return colours
+    return block_of(plan, plan.eye, row, whole=whole)
 
 
 def _lightings(block: Block, k: int) -> Iterator[Lighting]:
@@ -318,12 +326,73 @@ def describe(shape: Shape) -> str:
     return "a triangle " + ", ".join(_numbers(vertex) for vertex in shape.vertices)
 
 
+def _tree(rays: tuple[Ray, ...], in_short: bool) -> Iterator[str]:
+    """What adds up to the colour: at the eye's hit, then, indented, at what its mirrored ray meets, and so on."""
+    for depth, ray in enumerate(rays):
+        indent = "  " * depth
+        if in_short and depth > _MOST_REFLECTIONS:
+            count, more = len(rays) - depth, np.sum([ray.adds for ray in rays[depth:]], axis=0)
+            yield f"{indent[2:]}… {_count(count, 'reflection')} more: {_adds(vector(more), in_short)}"
+            return
+        if depth:
+            yield from (indent[2:] + line for line in _arrival(ray, in_short))
+        if ray.hit is None:
+            yield f"{indent}the background {_adds(ray.adds, in_short)}"
+        else:
+            yield from (indent + line for line in _answers(ray.hit, in_short))
+
+
+def _arrival(ray: Ray, in_short: bool) -> Iterator[str]:
+    """Where a mirrored ray goes, and how much of what it brings counts."""
+    share = f"k_refl = {ray.k_refl:.6g}, share {ray.share:.6g}"
+    meets = "hits nothing" if ray.hit is None else f"hits shape {ray.hit.index}"
+    if in_short:
+        yield f"mirrored, {share}: {meets}"
+        return
+    yield f"mirrored along {_numbers(ray.direction)}, {share}"
+    if ray.hit is None:
+        yield f"  {meets}"
+    else:
+        yield f"  {meets}, {describe(ray.hit.shape)}"
+        yield f"  point {_numbers(ray.hit.point)}, normal {_numbers(ray.hit.normal)}"
+
+
+def _answers(hit: Hit, in_short: bool) -> Iterator[str]:
+    """What the ambient colour and each light add at a hit."""
+    yield f"ambient {_adds(hit.ambient, in_short)}"
+    told = hit.lights[:_MOST_LIGHTS] if in_short and len(hit.lights) > _MOST_LIGHTS + 1 else hit.lights
+    for light in told:
+        yield f"light {_numbers(light.position)}{_answer(light, hit, in_short)}"
+    if left := hit.lights[len(told) :]:
+        more = np.sum([light.adds for light in left], axis=0)
+        yield f"… {_count(len(left), 'light')} more: {_adds(vector(more), in_short)}"
+
+
+def _answer(light: LightRay, hit: Hit, in_short: bool) -> str:
+    """Whether a light reaches a hit, and what it adds."""
+    shiny = f", H·N = {light.halfway:.6g}" if any(hit.shape.material.specular) else ""
+    cosines = f": N·L = {light.cosine:.6g}{shiny}"
+    if light.blocker is not None:
+        return f" is blocked by shape {light.blocker}" + ("" if in_short else f" at {_numbers(light.stop)}{cosines}")
+    if light.is_behind:
+        return " shines on the other side" + ("" if in_short else cosines)
+    return f"{cosines} {_adds(light.adds, in_short)}"
+
+
+def _adds(colour: Colour, in_short: bool) -> str:
+    return f"adds {_numbers(colour, 3 if in_short else 6)}"
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}" + ("s" if number > 1 else "")
+
+
 def _hit_or_miss(t: float) -> str:
     return "not certain" if np.isnan(t) else repr(t) if np.isfinite(t) else "a miss"
 
 
-def _numbers(values: tuple[float, ...]) -> str:
-    return "(" + ", ".join(f"{value + 0.0:.6g}" for value in values) + ")"  # + 0: no minus before a 0
+def _numbers(values: tuple[float, ...], digits: int = 6) -> str:
+    return "(" + ", ".join(f"{value + 0.0:.{digits}g}" for value in values) + ")"  # + 0: no minus before a 0
 
 
 def _bytes(row: np.ndarray) -> tuple[int, int, int]:

@@ -113,10 +113,17 @@ class Block:
         return np.where(self._flat, first + self._number, self._number).astype(np.int32)
 
     @cached_property
-    def _world(self) -> World:
+    def world(self) -> World:
+        """All shapes and lights, for light that goes on from the hits."""
         places = [light_from_eye(light, self.scene.camera, self._unit).tolist() for light in self.lights]
         lights = tuple((tuple(p), light.colour) for p, light in zip(places, self.lights, strict=True))
         return World(self.scene, lights)
+
+    @cached_property
+    def arrivals(self) -> tuple[np.ndarray, shading.Three, np.ndarray]:
+        """What `world` wants to know of the hits: t in its units, D, and the numbers of the shapes: arrays (hits,)."""
+        x, y, z = (component[self.hit] for component in self._directions)
+        return self._t, (x, y, z), self._where
 
     @cached_property
     def _landed(self) -> tuple[shading.Three, shading.Three, np.ndarray]:
@@ -231,9 +238,7 @@ def diffuse(block: Block) -> np.ndarray:
 def full(block: Block) -> np.ndarray:
     """C = ambient + k_refl · C of the mirrored ray + Σ over unshadowed lights of light · (diffuse · max(0, N·L) +
     specular · max(0, H·N)^power)"""
-    x, y, z = (component[block.hit] for component in block._directions)
-    colours = block._world.radiance(block._t, (x, y, z), block._where)
-    return block.paint(colours, elsewhere=block.scene.background)
+    return block.paint(block.world.radiance(*block.arrivals), elsewhere=block.scene.background)
 
 
 def normal(block: Block) -> np.ndarray:

@@ -11,6 +11,7 @@ import zipfile
 from bisect import bisect_right
 from dataclasses import dataclass
 from functools import cache, lru_cache
+from itertools import chain, repeat
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,8 @@ from PIL import Image, ImageDraw, ImageFont
 from raytracer import METHODS
 from raytracer.image import to_bytes
 from raytracer.methods import CERTIFIED
-from sketch.controls import KEYS, MOUSE, View
+from sketch.controls import KEYS, MOUSE, Place, View
+from sketch.rays import Ink
 from sketch.worker import Drawing
 
 SMALLEST = 320  # a smaller picture stands in the middle of a canvas of this side, so that text has room
@@ -31,6 +33,9 @@ BRIGHT, DIM, AMBER = (236, 238, 242), (150, 156, 168), (255, 196, 92)
 PANEL, LEGEND = (18, 20, 26, 232), (18, 20, 26, 168)
 
 _LONGEST = 2000  # characters of a text
+_DEEPEST = 24  # spaces before a line
+_SMALLEST_TYPE = 8
+_ENDING = 2  # lines at a panel's end that are seen also where it is cut
 _REACH = 5  # pixels from a marked pixel to the mark around it
 
 Colour = tuple[int, int, int]
@@ -73,6 +78,7 @@ class Panel:
     title: str
     rows: tuple[tuple[str, str], ...]
     colour: Colour = BRIGHT  # of the title
+    type: int = 16  # the largest that it is set in
 
 
 @dataclass(frozen=True)
@@ -137,8 +143,9 @@ def error_panel(path: Path, error: str) -> Panel:
     return Panel("This scene cannot be drawn", (("", error.replace(str(path), path.name)),), AMBER)
 
 
-def story_panel(lines: tuple[str, ...]) -> Panel:
-    return Panel(lines[0], tuple(("", line) for line in lines[1:]))
+def story_panel(lines: tuple[str, ...], over_rays: bool = False) -> Panel:
+    """What is told of a pixel; in smaller type where rays are to be seen beside it."""
+    return Panel(lines[0], tuple(("", line) for line in lines[1:]), type=12 if over_rays else 16)
 
 
 def compose(
@@ -148,23 +155,32 @@ def compose(
     panel: Panel | None = None,
     mark: tuple[int, int] | None = None,
     legend: Legend = (),
+    ink: Ink | None = None,
     out: np.ndarray | None = None,
 ) -> np.ndarray:
-    """The whole window: uint8 (height, width, 3), or `out` filled with it. `mark` is the panel's pixel."""
+    """The whole window: uint8 (height, width, 3), or `out` filled with it.
+
+    `mark` is the panel's pixel, `ink` is laid over the picture under everything else.
+    """
     frame = np.empty((layout.height, layout.width, 3), np.uint8) if out is None else out
     canvas, corner = frame[: layout.side], layout.corner
     if corner:
         canvas[:] = BACKDROP
-    _put(canvas[corner : corner + layout.size, corner : corner + layout.size], picture)
+    seen = canvas[corner : corner + layout.size, corner : corner + layout.size]
+    _put(seen, picture)
+    if ink is not None:
+        ink.lay_over(seen)
     _put(frame[layout.side :], _strip(layout.width, status))
     place = None if mark is None else (mark[0] + corner, mark[1] + corner)
-    if place is not None:
+    if mark is not None and place is not None:
+        near = tuple(slice(max(0, at - _REACH), at + _REACH + 1) for at in reversed(mark))
+        seen[near] = picture[near]
         _frame_pixel(canvas, *place)
     if legend:
         box = _legend(legend, layout.side)
         _blend(canvas, box, MARGIN, layout.side - MARGIN - len(box))
     if panel is not None:
-        _lay_over(canvas, panel, None if place is None else place[1])
+        _lay_over(canvas, panel, place, None if ink is None else (ink.rows + corner, ink.columns + corner))
     return frame
 
 
@@ -183,16 +199,31 @@ def _frame_pixel(canvas: np.ndarray, x: int, y: int) -> None:
     canvas[distance == _REACH - 1] = 255
 
 
-def _lay_over(canvas: np.ndarray, panel: Panel, row: int | None) -> None:
-    """Lay a panel over the canvas: in its middle, or above or below the row that is to stay seen."""
+def _lay_over(
+    canvas: np.ndarray, panel: Panel, mark: Place | None, inked: tuple[np.ndarray, np.ndarray] | None
+) -> None:
+    """Lay a panel over the canvas: in its middle, or where the mark stays seen, and most of what is inked."""
     side = len(canvas)
-    room = side if row is None else max(row, side - row) - _REACH
+    room = side if mark is None else max(mark[1], side - mark[1]) - _REACH
     text = _panel(panel, side - 2 * MARGIN, room - 2 * MARGIN)
     height, width = text.shape[:2]
     left, top = (side - width) // 2, (side - height) // 2
-    if row is not None:
-        top = MARGIN if row > side // 2 else side - height - MARGIN
+    if mark is not None:
+        top = MARGIN if mark[1] > side // 2 else side - height - MARGIN
+    if mark is not None and inked is not None:
+        corners = [(x, y) for y in (top, side - height - top) for x in (left, MARGIN, side - width - MARGIN)]
+        left, top = min(corners, key=lambda corner: _hidden(corner, (width, height), mark, inked))
     _blend(canvas, text, left, top)
+
+
+def _hidden(
+    corner: tuple[int, int], size: tuple[int, int], mark: Place, inked: tuple[np.ndarray, np.ndarray]
+) -> tuple[bool, int]:
+    """Whether a panel there would hide the mark, and how many of the inked pixels, given as rows and columns."""
+    across, down = ((start - _REACH, start + length + _REACH) for start, length in zip(corner, size, strict=True))
+    rows, columns = inked
+    covered = (across[0] <= columns) & (columns < across[1]) & (down[0] <= rows) & (rows < down[1])
+    return across[0] <= mark[0] < across[1] and down[0] <= mark[1] < down[1], int(np.count_nonzero(covered))
 
 
 def _blend(canvas: np.ndarray, over: np.ndarray, left: int, top: int) -> None:
@@ -221,12 +252,13 @@ def _strip(width: int, status: Status) -> np.ndarray:
 
 @lru_cache(maxsize=16)
 def _panel(panel: Panel, width: int, height: int) -> np.ndarray:
-    """A panel in the largest type in which it fits; RGBA."""
-    for size in (16, 15, 14, 13, 12, 11, 10, 9, 8):
-        image = _typeset(panel, size, width)
-        if image.height <= height:
-            break
-    return np.asarray(image)[: max(height, SMALLEST // 2)]
+    """A panel in the largest type in which it fits; what does not fit in the smallest gives way to "…". RGBA."""
+    height = max(height, SMALLEST // 2)
+    for size in range(panel.type, _SMALLEST_TYPE - 1, -1):
+        image = _typeset(panel, size, width, height)
+        if image is not None:
+            return np.asarray(image)
+    return np.asarray(_typeset(panel, _SMALLEST_TYPE, width, height, cut=True))
 
 
 @lru_cache(maxsize=16)
@@ -246,30 +278,47 @@ def _legend(legend: Legend, side: int) -> np.ndarray:
     return np.asarray(image)[: side - 2 * MARGIN]
 
 
-def _typeset(panel: Panel, size: int, room: int) -> Image.Image:
+def _typeset(panel: Panel, size: int, room: int, height: int, cut: bool = False) -> Image.Image | None:
+    """The panel in a type of this size, no wider than the room; None where it is too high and may not be cut."""
     pad, leading = size, round(1.35 * size)
     left = max(_length(label, size) for label, _ in panel.rows)  # labels are our own words, and short
     left += 1.2 * size if left else 0
-    rows = [(label, wrapped(text, size, room - 2 * pad - left)) for label, text in panel.rows]
-    widest = max(_length(line, size) for _, lines in rows for line in lines)
+    lines = [
+        (label if first else "", line)
+        for label, text in panel.rows
+        for first, line in zip(chain([True], repeat(False)), wrapped(text, size, room - 2 * pad - left), strict=False)
+    ]
+    fitting = (height - 2 * pad - leading // 2) // leading - 1  # under the title
+    if len(lines) > fitting:
+        if not cut:
+            return None
+        lines = [*lines[: fitting - 1 - _ENDING], ("", "…"), *lines[-_ENDING:]]
+    widest = max(_length(line, size) for _, line in lines)
     width = min(room, round(2 * pad + max(left + widest, _length(panel.title, size)) + 1))
-    height = 2 * pad + leading * (1 + sum(len(lines) for _, lines in rows)) + leading // 2
-    image = Image.new("RGBA", (width, height), PANEL)
-    draw, y = ImageDraw.Draw(image), pad
-    draw.text((pad, y), shortened(panel.title, size, width - 2 * pad), panel.colour, font(size))
-    y += leading + leading // 2
-    for label, lines in rows:
+    image = Image.new("RGBA", (width, 2 * pad + leading * (1 + len(lines)) + leading // 2), PANEL)
+    draw, y = ImageDraw.Draw(image), pad + leading + leading // 2
+    draw.text((pad, pad), shortened(panel.title, size, width - 2 * pad), panel.colour, font(size))
+    for label, line in lines:
         draw.text((pad, y), label, AMBER, font(size))
-        for line in lines:
-            draw.text((pad + left, y), line, BRIGHT, font(size))
-            y += leading
+        draw.text((pad + left, y), line, BRIGHT, font(size))
+        y += leading
     return image
 
 
 def wrapped(text: str, size: int, room: float) -> list[str]:
-    """The text in lines that fit, broken between words, and within a word only where it is too long for a line."""
+    """The text in lines that fit, broken between words, and within a word only where it is too long for a line.
+
+    Every line is indented twice as far as the text: spaces are narrow.
+    """
+    text = printable(text)
+    indent = " " * min(2 * (len(text) - len(text.lstrip(" "))), _DEEPEST)
+    lines = _broken(text.lstrip(" "), size, room - _length(indent, size))
+    return [indent + line for line in lines]
+
+
+def _broken(text: str, size: int, room: float) -> list[str]:
     lines, line = [], ""
-    for word in printable(text).split(" "):
+    for word in text.split(" "):
         longer = f"{line} {word}" if line else word
         if _length(longer, size) <= room:
             line = longer

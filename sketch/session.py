@@ -7,10 +7,12 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from raytracer import STAGES, SceneError, interpreter, probe_pixel, render_scene
+from raytracer.camera import make_raster
 from raytracer.methods import CERTIFIED
 from sketch import controls
 from sketch.controls import View
@@ -18,9 +20,18 @@ from sketch.files import save_beside
 from sketch.orbit import seen_from
 from sketch.overlay import Layout, Legend, Panel, compose, error_panel, help_panel, status, story_panel
 from sketch.pace import FrameRate
+from sketch.rays import Ink, ink_of, lines_of
 from sketch.worker import BLANK, Drawing, Renderer, Request
 
 _PATIENCE = 5.0  # seconds that the end waits for a picture to be saved
+
+
+class Story(NamedTuple):
+    """What is shown of a pixel."""
+
+    pixel: tuple[int, int]
+    lines: tuple[str, ...]
+    ink: Ink | None  # its rays over the picture
 
 
 class Session:
@@ -33,7 +44,7 @@ class Session:
         self._composed: Drawing | None = None  # the last that was part of the content
         self._frames = FrameRate()
         self._turn = threading.Lock()  # keys, the mouse and chores change the view one after the other
-        self._story: tuple[tuple[int, int], tuple[str, ...]] | None = None  # of which pixel, and its lines
+        self._story: Story | None = None
         self._chores = ThreadPoolExecutor(1, "chores")  # what takes a moment and is not drawing
         self._failure: BaseException | None = None  # of a chore
         self._renderer = Renderer(lambda: self.changed())
@@ -78,7 +89,8 @@ class Session:
         panel = self._panel(view, drawing)
         legend = () if panel is not None else self._legend(view, drawing)
         lines = status(view, drawing, size, self._frames.a_second)
-        return compose(self.layout, picture, lines, panel, view.pixel, legend, out)
+        story = self._told(view)
+        return compose(self.layout, picture, lines, panel, view.pixel, legend, story and story.ink, out)
 
     def _count(self, drawing: Drawing | None) -> None:
         """Count the frames that are shown while the camera moves."""
@@ -120,11 +132,16 @@ class Session:
         """What lies over the picture."""
         if view.help:
             return help_panel()
-        if self._story is not None and self._story[0] == view.pixel:
-            return story_panel(self._story[1])
+        if (story := self._told(view)) is not None:
+            return story_panel(story.lines, over_rays=story.ink is not None)
         if drawing is not None and drawing.error:
             return error_panel(drawing.request.path, drawing.error)
         return None
+
+    def _told(self, view: View) -> Story | None:
+        """The story of the view's pixel, once it is known."""
+        story = self._story
+        return story if story is not None and story.pixel == view.pixel else None
 
     @staticmethod
     def _legend(view: View, drawing: Drawing | None) -> Legend:
@@ -156,7 +173,8 @@ class Session:
             request = drawing.request
             size, stage, method = request.size, request.stage, request.method
             told = probe_pixel(drawing.scene, *pixel, size, size, stage, method=method)
-            self._story = pixel, tuple(told.lines())
+            lines = lines_of(told.rays, make_raster(drawing.scene.camera, size, size))
+            self._story = Story(pixel, tuple(told.lines()), ink_of(lines, size, size) if told.rays else None)
             print(*told.story(), sep="\n", flush=True)  # noqa: T201 (a click prints)
         return ""
 

@@ -13,9 +13,11 @@ import numpy as np
 import pytest
 
 from raytracer import METHODS, STAGES, eye_hits, interpreter, load_png, probe_pixel, render_scene
+from raytracer.camera import make_raster
 from sketch.controls import View
 from sketch.orbit import HOME, Orbit, seen_from
 from sketch.overlay import MARGIN, SMALLEST, STRIP, Layout, Panel, Status, _length, compose, help_panel, status
+from sketch.rays import lines_of
 from sketch.session import Session
 from sketch.worker import Drawing, Request
 
@@ -194,6 +196,23 @@ def test_a_click_prints_the_story(session, scenes, capsys):
     assert not shows(session, expected(scenes[0]))
     click(session, SIZE // 2, SIZE + 5)  # on the status: nothing
     assert session._view.pixel == (SIZE // 2, SIZE // 2)
+
+
+def test_at_the_stage_full_a_click_shows_the_rays_and_s_saves_the_picture_without(scenes, capsys, tmp_path):
+    (tmp_path / "1.cli").write_text(SPHERE)
+    session, picture = Session(View(scenes, stage="full"), SIZE), expected(scenes[0], "full")
+    wait_until(lambda: shows(session, picture))
+    click(session, 165, 130)
+    wait_until(lambda: not shows(session, picture) and session._story is not None)
+    raster = make_raster(interpreter(scenes[0]).camera, SIZE, SIZE)
+    (line,) = lines_of(probe_pixel(interpreter(scenes[0]), 165, 130, SIZE, SIZE, "full").rays, raster)
+    column, row = (round((a + b) / 2) for a, b in zip(line.start, line.end, strict=True))
+    assert session.content()[row, column].tolist() == [255, 255, 255]
+    assert session.content()[130, 165].tolist() == picture[130, 165].tolist()
+    session.press("s")
+    session.close()
+    assert "light (0, 5, 5): N·L = " in capsys.readouterr().out
+    assert np.array_equal(load_png(tmp_path / "1-full.png"), picture)
 
 
 def test_a_click_tells_what_the_method_found(scenes, capsys):

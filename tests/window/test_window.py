@@ -11,8 +11,10 @@ import pytest
 from window_driver import PROJECT, Sketch
 
 from raytracer import METHODS, STAGES, interpreter, load_png, probe_pixel, render_scene, save_png
+from raytracer.camera import make_raster
 from sketch.orbit import HALF_TURN, HOME, Orbit, seen_from
 from sketch.overlay import Layout, Status, compose
+from sketch.rays import MIRRORED, lines_of
 
 SIZE = 330
 SPHERE = "surface 1 0 0  0 0 0  0 0 0  1 0\nlight 0 5 5  1 1 1\nsphere 1 0 0 -4\n"
@@ -125,6 +127,24 @@ def test_a_click_tells_the_pixels_story_and_a_key_hides_it(sketch, expected):
     sketch.wait_until(lambda: "pixel 10 320" in sketch.stdout.read_text(), "another story")
     sketch.press("d")
     sketch.wait_for_picture(picture, "the picture without the story")
+
+
+def test_a_click_at_the_stage_full_draws_the_rays(start, tmp_path):
+    scene = interpreter(PROJECT / "scenes" / "09_mirror_spheres.cli")
+    sketch, picture = start(scene.path, "--size", SIZE, "--stage", "full"), render_scene(scene, "full", SIZE, SIZE)
+    sketch.wait_for_picture(picture, "a picture")
+    sketch.click(165, 184)
+    sketch.wait_until(lambda: "mirrored along" in sketch.stdout.read_text(), "the printed story")
+    rays = probe_pixel(scene, 165, 184, SIZE, SIZE, "full").rays
+    (mirrored,) = (line for line in lines_of(rays, make_raster(scene.camera, SIZE, SIZE)) if line.colour == MIRRORED)
+    x, y = map(round, mirrored.end)
+    sketch.wait_until(lambda: tuple(sketch.screen()[y, x]) == MIRRORED, "the dot where the mirrored ray arrives")
+    assert np.array_equal(sketch.screen()[184, 165], picture[184, 165])
+    sketch.press("s")
+    sketch.wait_for_picture(picture, "the picture without the rays")
+    sketch.press("Escape")
+    assert sketch.end() == 0
+    assert np.array_equal(load_png(tmp_path / "09_mirror_spheres-full.png"), picture)
 
 
 def test_dragging_turns_the_camera_and_c_returns(sketch, expected):
