@@ -306,6 +306,7 @@ class Canvas(NamedTuple):
     row_bytes: int  # from a row to the next
     pixel_bytes: int  # 3 or 4
     columns: int  # how many pixels of a row may be written to all of their bytes
+    first_row: int  # of the picture, that `bytes` begin with
 
 
 class HitRows(NamedTuple):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -139,35 +139,61 @@ def share_pieces(
 
 def _paint(plan: Plan, screen: Screen, picture: np.ndarray, watch: Watch) -> None:
     """A stage that a kernel paints; numpy paints the pixels that float64 was not certain of."""
-    paints: Paints | FullPaints = make_paints(plan, screen)
-    if plan.stage.throws_on:
-        paints = make_full_paints(plan, screen)
-    canvas = make_canvas(picture)
-    assert canvas is not None
-
-    def decide(doubtful: Pixels) -> None:
-        hits = doubtful.hits()
-        if isinstance(paints, FullPaints):
-            picture[doubtful.ys, doubtful.xs] = paints.background
-            some = hits.index >= 0
-            pixels = doubtful._replace(xs=doubtful.xs[some], ys=doubtful.ys[some])
-            colours = screen.radiance(pixels, Hits(hits.t[some], hits.index[some]), paints)
-            picture[pixels.ys, pixels.xs] = to_bytes(colours)
-            return
-        hits = screen.in_scene(hits)
-        block = Block(plan.scene, plan.raster, doubtful.ys, hits, plan.lights, doubtful.xs)
-        picture[doubtful.ys, doubtful.xs] = _colours(plan, block)
-
+    easel = make_easel(plan, screen, picture)
     pieces = -(-_PIECES // len(screen.bands(plan.shading))) if plan.stage.throws_on else 1
 
     def paint(rows: slice, piece: int, worker: int) -> slice:
-        for doubtful in screen.paint(plan.painter, rows, worker, paints, canvas, (piece, pieces)):
-            decide(doubtful)
+        tiles = screen.tiles_of(rows)
+        easel.paint(rows, worker, (tiles * piece // pieces, tiles * (piece + 1) // pieces))
         return rows
 
     share_pieces(screen, plan, watch, pieces, paint)
-    for doubtful in screen.doubtful(*range(len(screen.desks))):
-        decide(doubtful)
+    easel.finish(*range(len(screen.desks)))
+
+
+@dataclass
+class Easel:
+    """A picture, or some rows of it, while a kernel paints it."""
+
+    plan: Plan
+    screen: Screen
+    paints: Paints | FullPaints
+    picture: np.ndarray  # uint8 (rows, width, 3)
+    first_row: int = 0  # of the picture that the rows are of
+
+    def on(self, rows: np.ndarray, first_row: int) -> Easel:
+        """The same for other rows."""
+        return replace(self, picture=rows, first_row=first_row)
+
+    def paint(self, rows: slice, worker: int, tiles: tuple[int, int] | None = None) -> None:
+        """Paint some rows, or some tiles of them, as `Screen.paint` does; `finish` does the rest."""
+        canvas = make_canvas(self.picture, self.first_row)
+        assert canvas is not None
+        for doubtful in self.screen.paint(self.plan.painter, rows, worker, self.paints, canvas, tiles):
+            self._decide(doubtful)
+
+    def finish(self, *workers: int) -> None:
+        """Paint what these workers have found doubtful."""
+        for doubtful in self.screen.doubtful(*workers):
+            self._decide(doubtful)
+
+    def _decide(self, doubtful: Pixels) -> None:
+        hits, places = doubtful.hits(), (doubtful.ys - self.first_row, doubtful.xs)
+        if isinstance(self.paints, FullPaints):
+            self.picture[places] = self.paints.background
+            some = hits.index >= 0
+            pixels = doubtful._replace(xs=doubtful.xs[some], ys=doubtful.ys[some])
+            colours = self.screen.radiance(pixels, Hits(hits.t[some], hits.index[some]), self.paints)
+            self.picture[places[0][some], places[1][some]] = to_bytes(colours)
+            return
+        plan, found = self.plan, self.screen.in_scene(hits)
+        block = Block(plan.scene, plan.raster, doubtful.ys, found, plan.lights, doubtful.xs)
+        self.picture[places] = colours_of(plan, block)
+
+
+def make_easel(plan: Plan, screen: Screen, picture: np.ndarray) -> Easel:
+    """What a stage is painted with, and on."""
+    return Easel(plan, screen, (make_full_paints if plan.stage.throws_on else make_paints)(plan, screen), picture)
 
 
 def _paint_whole(plan: Plan, screen: Screen, picture: np.ndarray, watch: Watch) -> None:
@@ -194,12 +220,12 @@ def _paint_whole(plan: Plan, screen: Screen, picture: np.ndarray, watch: Watch) 
 def _draw_rows(
     plan: Plan, tracer: Eye | Screen, rows: slice, worker: int, whole: Whole | None, picture: np.ndarray
 ) -> slice:
-    picture[rows] = _colours(plan, block_of(plan, tracer, rows, worker, whole))
+    picture[rows] = colours_of(plan, block_of(plan, tracer, rows, worker, whole))
     return rows
 
 
 @np.errstate(all="ignore")
-def _colours(plan: Plan, block: Block) -> np.ndarray:
+def colours_of(plan: Plan, block: Block) -> np.ndarray:
     """The stage's colours of a block, as bytes."""
     return to_bytes(plan.stage.colours(block))
 

@@ -145,6 +145,10 @@ class Screen(NamedTuple):
         cuts = [row * height for row in range(0, rows, step)]
         return [slice(a, b) for a, b in zip(cuts, [*cuts[1:], self.raster.height], strict=True)]
 
+    def tiles_of(self, rows: slice) -> int:
+        """How many tiles these rows have, which are cut between tiles."""
+        return -(-(rows.stop - rows.start) // self.kernels.TILE_HEIGHT) * self.bins.columns
+
     def hits(self, rows: slice, worker: int = 0, polished: bool = False) -> Hits:
         """What the rays of these rows, cut between tiles, hit first: as `Eye.hits`."""
         shape = rows.stop - rows.start, self.raster.width
@@ -208,18 +212,18 @@ class Screen(NamedTuple):
         worker: int,
         paints: Paints | FullPaints | FineRays,
         out: Canvas | HitRows,
-        part: tuple[int, int] = (0, 1),
+        tiles: tuple[int, int] | None = None,
     ) -> Iterator[Pixels]:
         """Paint these rows, cut between tiles, by a kernel; yields doubtful pixels when there is no room for more.
 
-        Or, of so many parts of their tiles, paint one: part is which, counted from 0, and of how many.
+        Or only some of their tiles, from one on and before another, counted from 0, row by row.
 
         What is left of them `doubtful` tells.
         """
         kernel, (scratch, doubts) = getattr(self.kernels, painter), self.desks[worker]
         height, columns = self.kernels.TILE_HEIGHT, self.bins.columns
-        first, tiles = rows.start // height * columns, -(-(rows.stop - rows.start) // height) * columns
-        tile, last = first + tiles * part[0] // part[1], first + tiles * (part[0] + 1) // part[1]
+        first, (start, stop) = rows.start // height * columns, tiles or (0, self.tiles_of(rows))
+        tile, last = first + start, first + stop
         while (tile := kernel(self.view, self.slow, self.bins, tile, last, scratch, doubts, paints, out)) < last:
             yield from self.doubtful(worker)
 
@@ -338,15 +342,18 @@ _NO_BOXES = np.empty((0, 4), np.int32)
 _NONE_SLOW = Slow(np.empty(0, np.int32), _NO_BOXES, Seen(*[_NO_SPHERES] * len(Seen._fields)))
 
 
-def make_canvas(picture: np.ndarray) -> Canvas | None:
-    """The bytes of a picture (height, width, 3); None if its pixels are not three or four bytes apart."""
+def make_canvas(picture: np.ndarray, first_row: int = 0) -> Canvas | None:
+    """The bytes of a picture (height, width, 3), or of its rows from one on.
+
+    None if its pixels are not three or four bytes apart.
+    """
     height, width, _ = picture.shape
     row, pixel, byte = picture.strides
     if byte != 1 or pixel not in (3, 4) or row < width * pixel:
         return None
     size = (height - 1) * row + (width - 1) * pixel + 3
     flat = picture.reshape(-1) if picture.flags.c_contiguous else as_strided(picture, (size,), (1,))
-    return Canvas(flat, row, pixel, width if pixel == 3 else width - 1)
+    return Canvas(flat, row, pixel, width if pixel == 3 else width - 1, first_row)
 
 
 def _desk(workspace: Workspace, kernels: ModuleType, worker: int) -> Desk:

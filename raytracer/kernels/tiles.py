@@ -58,7 +58,7 @@ def _tile(view, bins, number):
 @inlined
 def put_lanes(out, row, x, right, red, green, blue, scratch):
     """Eight pixels from x on, or as many as there are before `right`."""
-    start = np.uint64(row * out.row_bytes + x * out.pixel_bytes)
+    start = np.uint64((row - out.first_row) * out.row_bytes + x * out.pixel_bytes)
     if x + WIDTH <= right and x + WIDTH <= out.columns:
         put_pixels(out.bytes, start, np.uint64(out.pixel_bytes), red, green, blue)
     else:
