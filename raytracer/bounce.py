@@ -57,10 +57,10 @@ def meet_sphere(
     )
     c = square - r2
     c = select(own | (abs(c) <= LEAVING * (square + r2 + radius * size)), 0.0, c)
-    half = r2 - _beside(h * over_a, o, d)
-    q = abs(h) + np.sqrt(a * half)
+    half, on = r2 - _beside(h * over_a, o, d), c == 0.0
+    q = abs(h) + select(on, abs(h), np.sqrt(a * half))  # √(h² − a·c), which for c = 0 is not to be rounded
     t = select((h < 0.0) & (c <= 0.0), q * over_a, abs(c) / q)
-    return select((half >= 0.0) & ((h < 0.0) | (c < 0.0)) & ~(own & from_outside), t, np.inf)
+    return select((on | (half >= 0.0)) & ((h < 0.0) | (c < 0.0)) & ~(own & from_outside), t, np.inf)
 
 
 def _beside(s: Number, o: Three, d: Three) -> Number:
