@@ -3,9 +3,10 @@ far, and they jump over what is close to it.
 
 `false_self_hits` counts the first: rays that leave a sphere or a large triangle outward, at points where eye rays hit
 it. `missed_contacts` counts the second: rays to a shape that touches the first, or leaves a narrow gap. By construction
-they start in the gap, at a point that is farther from the other shape than P is off (`bounce.LEAVING`), and hit the
-other shape; the truth, at which of its two sides, is worked out in two-fold float64 from the rounded P, and the tests
-compare that with integers. A contact is missed if a method finds nothing, or the other side.
+they start in the gap, at a point that is farther from the other shape than P may be off (`bounce.LEAVING`, and the
+rounding of the shapes' own places), and hit the other shape. The truth, at which of its two sides, is worked out in
+two-fold float64 from the rounded P; the tests compare that with integers. A contact is missed if a method finds
+nothing, or the other side.
 
 A scene's `scale` is the length that most of its other lengths are near.
 """
@@ -18,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from raytracer.bounce import LEAVING
+from raytracer.certified import U
 from raytracer.offsets import OFFSETS, Leaving, meets_exactly, seen_from
 
 SCALES = tuple(10.0**power for power in range(-3, 10))
@@ -171,18 +173,17 @@ def _touch(
     At a distance s from the contact, beside it, the gap is s² (1/r + 1/R) / 2, but for terms of s⁴.
     """
     axes, contacts = _units(rng, len(own)), _places(rng, scale, len(own)) + away
-    narrow = np.log10(_SAFE * LEAVING * (own + other + 4.0 * scale))
+    narrow = np.log10(_SAFE * (LEAVING * (own + other + 4.0 * scale) + U * np.abs(contacts).max(axis=1)))
     gaps = 10.0 ** (narrow + (np.log10(_WIDEST * scale) - narrow) * rng.random(len(own)))
     turn = (np.sqrt(2.0 * gaps / (1.0 / own + 1.0 / other)) / own)[:, None]
     beside = _beside(rng, axes)
     normals = np.cos(turn) * axes + np.sin(turn) * beside
     points = contacts + own[:, None] * (np.sin(turn) * beside - 2.0 * np.sin(turn / 2.0) ** 2 * axes)
-    eyes = points + scale * _turned(_units(rng, len(own)), normals)
+    eyes = points + scale * (_turned(_units(rng, len(own)), normals) + normals / 4.0)
     depth = np.minimum(other, scale)[:, None]
     aims = contacts + depth * (axes + 0.9 * rng.random((len(own), 1)) * _units(rng, len(own)))
     rays = Leaving(eyes, points - eyes, _balls(contacts, own, -axes), aims - points)
-    outward = ((aims - points) * normals).sum(axis=1) > 0.0
-    return _some(Contact(rays, _balls(contacts, other, axes)), outward & np.isfinite(rays.t))
+    return _some(Contact(rays, _balls(contacts, other, axes)), ((aims - points) * normals).sum(axis=1) > 0.0)
 
 
 def _some(contact: Contact, which: np.ndarray) -> Contact:
