@@ -83,7 +83,8 @@ def moved_by_ulps(p: np.ndarray, n: np.ndarray) -> np.ndarray:
 
     C. Wächter, N. Binder, A Fast and Robust Method for Avoiding Self-Intersection, Ray Tracing Gems 6 (2019), with the
     paper's constants for float32: origin = 1/32, float_scale = 1/65536, int_scale = 256. For float64 float_scale is
-    2²⁹ times smaller, as its ulps are.
+    2²⁹ times smaller, as its ulps are. (The paper takes P from a triangle's corners, which brings it closer to the
+    triangle than O + t·D does. A sphere has no corners.)
     """
     single = p.dtype == np.float32
     whole, float_scale = (np.int32, 2.0**-16) if single else (np.int64, 2.0**-45)
