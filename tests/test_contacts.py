@@ -156,6 +156,15 @@ def test_no_light_leaks_through_a_shell_that_is_close(path, shift):
     np.testing.assert_array_equal(picture, dark)
 
 
+@pytest.mark.parametrize("height", [1.0, 1e-4, 1e-8, 1e-12, 1e-14, 1e-15, 3e-16])
+def test_a_mirror_room_has_no_hole(path, height):
+    """The eye is inside a mirror ball, this far from the wall: rays graze it, are thrown back, and none gets out."""
+    x, y, z = ((height - 1.0) * np.array([0.36, 0.48, 0.8])).tolist()
+    text = f"fov 120\neye {x!r} {y!r} {z!r}\nuvw .8 -.6 0  .36 .48 .8  .48 .64 -.6\nbackground 1 1 1\n"
+    text += "surface 0 0 0  0 0 0  0 0 0  1  1\nsphere 1 0 0 0\n"
+    assert not drawn(interpret(text), path).any()
+
+
 @pytest.mark.parametrize("name", ["02_ground_like_the_earth", "05_shells_one_ulp_apart", "06_far_from_the_origin"])
 def test_both_paths_draw_the_same_light(name):
     scene = interpreter(f"scenes/hard/{name}.cli")
