@@ -82,9 +82,11 @@ def verify(arguments: argparse.Namespace) -> int:
 def chart(arguments: argparse.Namespace) -> int:
     """Measure every method, speed against accuracy, and draw the charts: about two minutes."""
     from raytracer.chart import chart as draw_charts  # loads matplotlib
+    from raytracer.chart_contacts import chart_contacts
 
     with tqdm(bar_format="{desc}", leave=False, disable=None) as line:
-        for path in draw_charts(arguments.output, arguments.long, progress=line.set_description_str):
+        paths = chart_contacts(arguments.output, progress=line.set_description_str)
+        for path in [*paths, *draw_charts(arguments.output, arguments.long, progress=line.set_description_str)]:
             print(path)
     return 0
 

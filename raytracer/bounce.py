@@ -71,7 +71,7 @@ def hits_sphere(
 
 
 def sphere_hit_at(h: Number, c: Number, disc: Number, over_a: Number) -> Number:
-    """t of a hit: from c = 0 exactly −2h/a but for rounding."""
+    """t of a hit: from c = 0 it is −2h/a, whose root is not to be rounded."""
     q = abs(h) + select(c == 0.0, abs(h), np.sqrt(disc))
     return select((h < 0.0) & (c <= 0.0), q * over_a, abs(c) / q)
 
