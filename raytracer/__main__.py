@@ -18,7 +18,7 @@ from raytracer import Plan, SceneError, interpreter, make_plan, probe_pixel, sav
 from raytracer.camera import SAMPLINGS
 from raytracer.image import check_can_save
 from raytracer.methods import CERTIFIED, METHODS
-from raytracer.render import draw
+from raytracer.samples import SAMPLES, Samples, check_samples, draw_samples
 from raytracer.stages import STAGES
 
 
@@ -26,6 +26,7 @@ def render(arguments: argparse.Namespace) -> int:
     """Draw a scene into a PNG file."""
     check_can_save(arguments.output)
     plan = _plan(arguments)
+    check_samples(arguments.samples, plan)
     for warning in plan.warnings:
         print(f"{arguments.scene}: {warning}", file=sys.stderr)
     with tqdm(unit=" bands", delay=1, leave=False, disable=None) as bar:
@@ -34,7 +35,9 @@ def render(arguments: argparse.Namespace) -> int:
             bar.total = total
             bar.update(1)
 
-        picture = draw(plan, threads=arguments.threads, progress=show, cancelled=_interrupted.is_set)
+        picture = draw_samples(
+            plan, arguments.samples, threads=arguments.threads, progress=show, cancelled=_interrupted.is_set
+        )
     save_png(arguments.output, picture)
     return 0
 
@@ -139,6 +142,11 @@ def count(text: str) -> int:
     return int(text)
 
 
+def samples(text: str) -> Samples:
+    """A number of samples, or a word."""
+    return int(text) if text.isdigit() else text
+
+
 class Argument(NamedTuple):
     """One argument of a command: its names, and what argparse is told about it."""
 
@@ -173,6 +181,16 @@ COMMANDS: dict[str, tuple[Callable[[argparse.Namespace], int], tuple[Argument, .
                 ("-o", "--output"), {"metavar": "OUT.png", "type": Path, "required": True, "help": "the file to write"}
             ),
             *_PICTURE,
+            Argument(
+                ("--samples",),
+                {
+                    "metavar": "N",
+                    "type": samples,
+                    "choices": SAMPLES,
+                    "default": 1,
+                    "help": "rays a pixel: 1, 4, 16, 64, 256, or adaptive, where neighbours differ; default 1",
+                },
+            ),
             Argument(("--threads",), {"metavar": "N", "type": count, "help": "default: as many as there are cores"}),
         ),
     ),

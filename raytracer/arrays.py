@@ -307,6 +307,7 @@ class Canvas(NamedTuple):
     pixel_bytes: int  # 3 or 4
     columns: int  # how many pixels of a row may be written to all of their bytes
     first_row: int  # of the picture, that `bytes` begin with
+    wanted: np.ndarray  # uint8 (rows, eights): which eight pixels of a row are painted at all; (0, 0) for all
 
 
 class HitRows(NamedTuple):

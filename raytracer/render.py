@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -42,6 +42,7 @@ def render_scene(
     *,
     sampling: str = "corner",
     method: str = CERTIFIED,
+    samples: int | str = 1,
     threads: int | None = None,
     out: np.ndarray | None = None,
     progress: Progress | None = None,
@@ -49,13 +50,18 @@ def render_scene(
 ) -> np.ndarray:
     """The picture of a scene at a stage: uint8 (height, width, 3), red, green, blue, the top row first.
 
+    `samples` is how many rays a pixel has: 1, 4, 16, 64 or 256, or "adaptive", more of them only where neighbours
+    differ (see `raytracer.samples`).
+
     `out` is an array of that shape to draw into. `progress(done, total, rows)` is called after each band of rows, with
     those that are finished, from the calling thread; `cancelled()` before each, from the threads that draw. Raises
     ValueError for a stage, size, sampling or method that there is not, `PictureTooLargeError` before anything is drawn,
     and `Cancelled`.
     """
     plan = make_plan(scene, stage, width, height, sampling, method)
-    return draw(plan, threads=threads, out=out, progress=progress, cancelled=cancelled)
+    from raytracer.samples import draw_samples  # which draws by what is below
+
+    return draw_samples(plan, samples, threads=threads, out=out, progress=progress, cancelled=cancelled)
 
 
 def draw(
@@ -68,7 +74,7 @@ def draw(
 ) -> np.ndarray:
     """`render_scene` for whoever has made the plan already."""
     shape = plan.raster.height, plan.raster.width, 3
-    picture = np.empty(shape, np.uint8) if out is None else _fitting(out, shape)
+    picture = np.empty(shape, np.uint8) if out is None else fitting(out, shape)
     if plan.painter and make_canvas(picture) is None:
         picture[...] = draw(plan, threads=threads, progress=progress, cancelled=cancelled)
         return picture
@@ -160,30 +166,31 @@ class Easel:
     paints: Paints | FullPaints
     picture: np.ndarray  # uint8 (rows, width, 3)
     first_row: int = 0  # of the picture that the rows are of
+    wanted: np.ndarray = field(default_factory=lambda: np.empty((0, 0), np.uint8))  # see `Canvas`
 
-    def on(self, rows: np.ndarray, first_row: int) -> Easel:
+    def on(self, rows: np.ndarray, first_row: int, wanted: np.ndarray) -> Easel:
         """The same for other rows."""
-        return replace(self, picture=rows, first_row=first_row)
+        return replace(self, picture=rows, first_row=first_row, wanted=wanted)
 
     def paint(self, rows: slice, worker: int, tiles: tuple[int, int] | None = None) -> None:
         """Paint some rows, or some tiles of them, as `Screen.paint` does; `finish` does the rest."""
-        canvas = make_canvas(self.picture, self.first_row)
+        canvas = make_canvas(self.picture, self.first_row, self.wanted)
         assert canvas is not None
         for doubtful in self.screen.paint(self.plan.painter, rows, worker, self.paints, canvas, tiles):
-            self._decide(doubtful)
+            self._decide(doubtful, worker)
 
     def finish(self, *workers: int) -> None:
         """Paint what these workers have found doubtful."""
         for doubtful in self.screen.doubtful(*workers):
-            self._decide(doubtful)
+            self._decide(doubtful, workers[0])
 
-    def _decide(self, doubtful: Pixels) -> None:
+    def _decide(self, doubtful: Pixels, worker: int) -> None:
         hits, places = doubtful.hits(), (doubtful.ys - self.first_row, doubtful.xs)
         if isinstance(self.paints, FullPaints):
             self.picture[places] = self.paints.background
             some = hits.index >= 0
             pixels = doubtful._replace(xs=doubtful.xs[some], ys=doubtful.ys[some])
-            colours = self.screen.radiance(pixels, Hits(hits.t[some], hits.index[some]), self.paints)
+            colours = self.screen.radiance(pixels, Hits(hits.t[some], hits.index[some]), self.paints, worker)
             self.picture[places[0][some], places[1][some]] = to_bytes(colours)
             return
         plan, found = self.plan, self.screen.in_scene(hits)
@@ -311,7 +318,7 @@ def _no_hits(rows: slice, width: int) -> Hits:
     return Hits(np.empty(shape), np.empty(shape, np.int32))
 
 
-def _fitting(out: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+def fitting(out: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     if not isinstance(out, np.ndarray) or out.shape != shape or out.dtype != np.uint8:
         found = f"{out.dtype} {out.shape}" if isinstance(out, np.ndarray) else type(out).__name__
         raise ValueError(f"out: found {found}, expected uint8 {shape}")

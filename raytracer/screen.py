@@ -227,14 +227,21 @@ class Screen(NamedTuple):
         while (tile := kernel(self.view, self.slow, self.bins, tile, last, scratch, doubts, paints, out)) < last:
             yield from self.doubtful(worker)
 
-    def radiance(self, pixels: Pixels, hits: Hits, paints: FullPaints) -> np.ndarray:
+    def radiance(self, pixels: Pixels, hits: Hits, paints: FullPaints, worker: int) -> np.ndarray:
         """The colours of the stage `full` for some pixels that hit something: float64 (n, 3)."""
         count = len(pixels.xs)
         eights = [np.resize(array, -(-count // SPARE) * SPARE) for array in (*hits, pixels.xs, pixels.ys)]
         t, index, columns, rows = eights
         colours = np.empty((len(t), 3))
         self.kernels.radiance_of(
-            self.view, paints, t, index, columns.astype(np.int32), rows.astype(np.int32), self.desks[0].scratch, colours
+            self.view,
+            paints,
+            t,
+            index,
+            columns.astype(np.int32),
+            rows.astype(np.int32),
+            self.desks[worker].scratch,
+            colours,
         )
         return colours[:count]
 
@@ -342,8 +349,11 @@ _NO_BOXES = np.empty((0, 4), np.int32)
 _NONE_SLOW = Slow(np.empty(0, np.int32), _NO_BOXES, Seen(*[_NO_SPHERES] * len(Seen._fields)))
 
 
-def make_canvas(picture: np.ndarray, first_row: int = 0) -> Canvas | None:
-    """The bytes of a picture (height, width, 3), or of its rows from one on.
+_ALL = np.empty((0, 0), np.uint8)
+
+
+def make_canvas(picture: np.ndarray, first_row: int = 0, wanted: np.ndarray = _ALL) -> Canvas | None:
+    """The bytes of a picture (height, width, 3), or of its rows from one on; `wanted` as in `Canvas`.
 
     None if its pixels are not three or four bytes apart.
     """
@@ -353,7 +363,7 @@ def make_canvas(picture: np.ndarray, first_row: int = 0) -> Canvas | None:
         return None
     size = (height - 1) * row + (width - 1) * pixel + 3
     flat = picture.reshape(-1) if picture.flags.c_contiguous else as_strided(picture, (size,), (1,))
-    return Canvas(flat, row, pixel, width if pixel == 3 else width - 1, first_row)
+    return Canvas(flat, row, pixel, width if pixel == 3 else width - 1, first_row, wanted)
 
 
 def _desk(workspace: Workspace, kernels: ModuleType, worker: int) -> Desk:

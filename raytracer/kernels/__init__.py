@@ -20,7 +20,7 @@ with cache_named_after_sources():
     from raytracer.kernels.trace import nearest_given, nearest_twofold, polish, refine_given
     from raytracer.kernels.usual import usual_eye, usual_given
     from raytracer.kernels.visibility import STRIDE, candidates
-    from raytracer.kernels.whole import paint_depth, paint_edges, range_of
+    from raytracer.kernels.whole import mean_of_blocks, paint_depth, paint_edges, range_of
 
 __all__ = [
     "CORNERS",
@@ -38,6 +38,7 @@ __all__ = [
     "fill",
     "find_fine_hits",
     "find_hits",
+    "mean_of_blocks",
     "nearest_given",
     "nearest_in_tree",
     "nearest_twofold",

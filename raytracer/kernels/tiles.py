@@ -96,10 +96,12 @@ def _flat_tile(view, scratch, tile, paints, out):
 
 
 def _shaded_tile(view, scratch, tile, paints, out):
-    background = _background(paints)
+    background, some = _background(paints), len(out.wanted) > 0
     for row in range(tile.top, tile.bottom):
         line = _line(view, row)
         for x in range(tile.left, tile.right, WIDTH):
+            if some and not out.wanted[row - out.first_row, x // WIDTH]:
+                continue
             place = _place(tile, row, x)
             index = load(scratch.index, place)
             hit = is_hit(index)

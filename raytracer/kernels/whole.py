@@ -10,6 +10,25 @@ from raytracer.twofold import select
 
 
 @borrowing
+def mean_of_blocks(large, side, wanted, out):
+    """The means of side × side blocks of bytes, rounded, of a picture (rows, columns, 3), where they are wanted."""
+    for row in range(out.shape[0]):
+        for column in range(out.shape[1]):
+            if not wanted[row, column]:
+                continue
+            red, green, blue = 0, 0, 0
+            for y in range(row * side, row * side + side):
+                for x in range(column * side, column * side + side):
+                    red += large[y, x, 0]
+                    green += large[y, x, 1]
+                    blue += large[y, x, 2]
+            half, count = side * side // 2, side * side
+            out[row, column, 0] = (red + half) // count
+            out[row, column, 1] = (green + half) // count
+            out[row, column, 2] = (blue + half) // count
+
+
+@borrowing
 def range_of(t, index):
     """The smallest and the largest t of all hits, or +inf and 0."""
     near, far = np.inf, 0.0

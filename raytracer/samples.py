@@ -1,0 +1,154 @@
+"""More than one sample a pixel: everywhere, or only where it matters.
+
+With n × n samples the picture is drawn n times as wide and as high, and each n × n block of its pixels becomes their
+mean: the mean of what is drawn, bytes that is, so that a highlight far above white does not outshine its neighbours.
+A block's rays fill its pixel's area from the corner, or evenly about the centre, as `sampling` says of the single one.
+
+`adaptive` draws one sample a pixel, looks where neighbours differ, be it for another shape, a shadow's border or a
+highlight, and paints only those pixels of the large picture. That is never there as a whole: a strip of it at a time, a
+tile high.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from math import isqrt
+
+import numpy as np
+
+from raytracer.camera import Raster
+from raytracer.eye import Eye
+from raytracer.plan import Plan
+from raytracer.pool import share
+from raytracer.render import (
+    Cancelled,
+    Easel,
+    Progress,
+    Watch,
+    block_of,
+    colours_of,
+    draw,
+    fitting,
+    make_easel,
+    open_tracer,
+)
+from raytracer.screen import Screen
+
+ADAPTIVE = "adaptive"
+SAMPLES = (1, 4, 16, 64, 256, ADAPTIVE)
+SIDE = 8  # of the block of samples of a pixel, where `adaptive` takes more than one
+DIFFERS = 16  # bytes by which neighbours differ that are looked at more closely
+_TILE = 64  # pixels of the large picture, along a tile's edge
+
+Samples = int | str
+
+
+def check_samples(samples: Samples, plan: Plan) -> None:
+    """ValueError for a number of samples that there is not, or a stage that has but one."""
+    if samples not in SAMPLES:
+        raise ValueError(f"found {samples!r} samples, expected one of {', '.join(map(str, SAMPLES))}")
+    stage = plan.stage
+    if samples != 1 and (stage.needs_whole or stage.needs_truth or stage.needs_tests):
+        raise ValueError(f"found {samples} samples, expected 1: stage {plan.name} is about single pixels")
+
+
+def draw_samples(
+    plan: Plan,
+    samples: Samples,
+    *,
+    threads: int | None = None,
+    out: np.ndarray | None = None,
+    progress: Progress | None = None,
+    cancelled: Callable[[], bool] | None = None,
+) -> np.ndarray:
+    """`draw` with so many samples a pixel, a row of `SAMPLES`."""
+    check_samples(samples, plan)
+    if samples == 1:
+        return draw(plan, threads=threads, out=out, progress=progress, cancelled=cancelled)
+    raster = plan.raster
+    size = raster.height, raster.width, 3
+    if samples == ADAPTIVE:
+        picture, side = draw(plan, threads=threads, out=out, cancelled=cancelled), SIDE
+        wanted = differing(picture)
+    else:
+        picture, side = np.empty(size, np.uint8) if out is None else fitting(out, size), isqrt(int(samples))
+        wanted = np.ones(size[:2], bool)
+    fine = replace(plan, raster=Raster(raster.camera, raster.width * side, raster.height * side, raster.sampling))
+    _draw_means(fine, side, wanted, picture, Watch(threads, progress, cancelled))
+    return picture
+
+
+def _draw_means(fine: Plan, side: int, wanted: np.ndarray, picture: np.ndarray, watch: Watch) -> None:
+    """Draw the large picture, a strip at a time, and put the means of its blocks where they are wanted."""
+    height = _TILE // side
+    strips = [slice(row, min(row + height, len(wanted))) for row in range(0, len(wanted), height)]
+    strips = [rows for rows in strips if wanted[rows].any()]
+    with open_tracer(fine, watch.threads) as tracer:
+        easel = make_easel(fine, tracer, picture) if fine.painter and isinstance(tracer, Screen) else None
+
+        def one(rows: slice, worker: int) -> slice:
+            if watch.cancelled is not None and watch.cancelled():
+                raise Cancelled
+            _draw_strip(fine, tracer, easel, rows, side, wanted[rows], picture[rows], worker)
+            return rows
+
+        def tell(rows: slice) -> None:
+            watch.done += 1
+            if watch.progress is not None:
+                watch.progress(watch.done, len(strips), rows)
+
+        share(strips, one, watch.threads, tell)
+
+
+def differing(picture: np.ndarray) -> np.ndarray:
+    """Which pixels of a picture (height, width, 3) differ visibly from one of their eight neighbours: bool."""
+    height, width, _ = picture.shape
+    around = np.pad(picture, ((1, 1), (1, 1), (0, 0)), "edge")
+    low, high = picture, picture
+    for y in range(3):
+        for x in range(3):
+            shifted = around[y : y + height, x : x + width]
+            low, high = np.minimum(low, shifted), np.maximum(high, shifted)
+    return np.asarray((high - low > DIFFERS).any(axis=2))
+
+
+def _draw_strip(
+    fine: Plan, tracer: Eye | Screen, easel: Easel | None, rows: slice, side: int, wanted: np.ndarray,
+    picture: np.ndarray, worker: int,
+) -> None:  # fmt: skip
+    """Draw what is wanted of some rows, bool (rows, width), into those of the picture."""
+    large_rows = slice(rows.start * side, rows.stop * side)
+    if easel is None:
+        large = colours_of(fine, block_of(fine, tracer, large_rows, worker))
+        picture[wanted] = _means(large, side)[wanted]
+        return
+    kernels = easel.screen.kernels
+    assert kernels.TILE_WIDTH == kernels.TILE_HEIGHT == _TILE
+    large = np.empty((large_rows.stop - large_rows.start, fine.raster.width, 3), np.uint8)
+    eights = _any_of(wanted.repeat(side, axis=1), 8)
+    part = easel.on(large, large_rows.start, eights.repeat(side, axis=0).astype(np.uint8))
+    for run in _runs(np.asarray(_any_of(eights, _TILE // 8).any(axis=0))):
+        part.paint(large_rows, worker, run)
+    part.finish(worker)
+    kernels.mean_of_blocks(large, side, wanted, picture)
+
+
+def _any_of(flags: np.ndarray, columns: int) -> np.ndarray:
+    """Whether any of so many columns side by side is set: bool (rows, columns // that, rounded up)."""
+    padded = np.pad(flags, ((0, 0), (0, -flags.shape[1] % columns)))
+    return np.asarray(padded.reshape(len(flags), -1, columns).any(axis=2))
+
+
+def _runs(wanted: np.ndarray) -> Iterator[tuple[int, int]]:
+    """Where tiles are wanted one after the other: from one on, before another."""
+    ends = np.flatnonzero(np.diff(np.concatenate([[False], wanted, [False]])))
+    yield from zip(ends[::2].tolist(), ends[1::2].tolist(), strict=True)
+
+
+def _means(large: np.ndarray, side: int) -> np.ndarray:
+    """The means of blocks of bytes, rounded: uint8."""
+    height, width, _ = large.shape
+    total = large.reshape(height // side, side, width // side, side, 3).sum(axis=(1, 3), dtype=np.uint32)
+    means: np.ndarray = ((total + side * side // 2) // (side * side)).astype(np.uint8)
+    return means
