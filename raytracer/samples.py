@@ -34,6 +34,7 @@ from raytracer.render import (
     open_tracer,
 )
 from raytracer.screen import Screen
+from raytracer.stages import Stage
 
 ADAPTIVE = "adaptive"
 SAMPLES = (1, 4, 16, 64, 256, ADAPTIVE)
@@ -44,12 +45,16 @@ _TILE = 64  # pixels of the large picture, along a tile's edge
 Samples = int | str
 
 
+def takes_samples(stage: Stage) -> bool:
+    """Whether a stage may have more than one sample a pixel; those that are about single pixels may not."""
+    return not (stage.needs_whole or stage.needs_truth or stage.needs_tests)
+
+
 def check_samples(samples: Samples, plan: Plan) -> None:
     """ValueError for a number of samples that there is not, or a stage that has but one."""
     if samples not in SAMPLES:
         raise ValueError(f"found {samples!r} samples, expected one of {', '.join(map(str, SAMPLES))}")
-    stage = plan.stage
-    if samples != 1 and (stage.needs_whole or stage.needs_truth or stage.needs_tests):
+    if samples != 1 and not takes_samples(plan.stage):
         raise ValueError(f"found {samples} samples, expected 1: stage {plan.name} is about single pixels")
 
 

@@ -9,9 +9,11 @@ from typing import NamedTuple
 
 from raytracer import METHODS, STAGES
 from raytracer.methods import CERTIFIED
+from raytracer.samples import ADAPTIVE, Samples, takes_samples
 from sketch.orbit import HOME, Orbit
 
 SCENE_KEYS = "1234567890-"
+SAMPLES_OF_KEY: tuple[Samples, ...] = (1, 4, 16, ADAPTIVE)
 MOUSE = (
     ("a click", "tells a pixel's story"),
     ("dragging", "turns the camera about the scene"),
@@ -39,6 +41,7 @@ class View:
     place: int = 0  # which of them
     stage: str = "diffuse"
     method: str = CERTIFIED
+    samples: Samples = 1  # rays a pixel, where the stage takes more than one
     readings: int = 0  # how often the user has asked for the files to be read again
     orbit: Orbit = HOME  # where the scene is seen from
     grip: Grip | None = None  # while a button is held down
@@ -47,6 +50,10 @@ class View:
     legend: bool = True  # of a stage that has one
     note: str = ""  # the answer to the last key
     wish: str = ""  # what the last key wants done beside showing something: "save", "quit" or nothing
+
+    @property
+    def samples_of_stage(self) -> Samples:
+        return self.samples if takes_samples(STAGES[self.stage]) else 1
 
     @property
     def scene(self) -> Path:
@@ -90,6 +97,13 @@ def to_next_method(view: View, key: str) -> View:
     return replace(view, method=names[(names.index(view.method) + step) % len(names)])
 
 
+def to_next_samples(view: View, key: str) -> View:
+    """More samples a pixel, and after the most one again."""
+    after = SAMPLES_OF_KEY[(SAMPLES_OF_KEY.index(view.samples) + 1) % len(SAMPLES_OF_KEY)]
+    note = "" if takes_samples(STAGES[view.stage]) else f"stage {view.stage} has one sample a pixel"
+    return replace(view, samples=after, note=note)
+
+
 def to_file_view(view: View, key: str) -> View:
     note = "this is the file's own view" if view.orbit == HOME else ""
     return _at_home(replace(view, note=note))
@@ -123,6 +137,7 @@ KEYS = (
     *(Key(stage.key, stage.key, f"{name}: {stage.about}", to_stage) for name, stage in STAGES.items()),
     Key("\t", "Tab", "the next stage", to_next_stage),
     Key("mM", "m", "the next method; M the one before", to_next_method),
+    Key("a", "a", "anti-aliasing: 1, 4 or 16 samples a pixel, or more only where neighbours differ", to_next_samples),
     Key("c", "c", "the file's own view again, after the mouse has changed it", to_file_view),
     Key("l", "l", "hide the legend, or show it", show_legend),
     Key("r", "r", "read the scene's file again", read_again),

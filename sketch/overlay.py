@@ -105,6 +105,8 @@ def status(view: View, drawing: Drawing | None, size: int, frames_a_second: floa
     else:
         time = f"{drawing.milliseconds:.1f} ms" if drawing.whole else f"drawing, {drawing.done:.0%}"
     how = view.stage if view.method == CERTIFIED else f"{view.stage} · {view.method}"
+    if view.samples_of_stage != 1:
+        how += f" · {view.samples} samples"
     figures = f"{view.place + 1} of {len(view.scenes)} · {how} · {size} × {size} · {time}"
     path = f"{drawing.path} path" if drawing is not None and drawing.path else ""
     return Status(view.scene.stem, figures, *_remark(view, drawing), path)
@@ -119,7 +121,8 @@ def _pace(drawing: Drawing, frames_a_second: float | None) -> str:
 def _answers(drawing: Drawing, view: View) -> bool:
     """Whether a drawing is of what the view is of."""
     request = drawing.request
-    return (request.path, request.stage, request.method) == (view.scene, view.stage, view.method)
+    wanted = view.scene, view.stage, view.method, view.samples_of_stage
+    return (request.path, request.stage, request.method, request.samples) == wanted
 
 
 def _remark(view: View, drawing: Drawing | None) -> tuple[str, Colour]:

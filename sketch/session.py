@@ -126,7 +126,9 @@ class Session:
         self.changed()
 
     def _request(self, view: View) -> Request:
-        return Request(view.scene, view.stage, self.layout.size, view.method, view.readings, view.orbit)
+        return Request(
+            view.scene, view.stage, self.layout.size, view.method, view.readings, view.orbit, view.samples_of_stage
+        )
 
     def _panel(self, view: View, drawing: Drawing | None) -> Panel | None:
         """What lies over the picture."""

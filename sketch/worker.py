@@ -18,6 +18,7 @@ from raytracer import Cancelled, Scene, SceneError, backend, interpreter, make_p
 from raytracer.image import to_bytes
 from raytracer.methods import CERTIFIED
 from raytracer.render import draw, warm_up
+from raytracer.samples import Samples, draw_samples
 from raytracer.scene import Vector
 from raytracer.stages import FALSE_HIT, FALSE_MISS, WRONG_SHAPE
 from sketch.orbit import HOME, Orbit, pivot_of, seen_from
@@ -38,6 +39,7 @@ class Request:
     method: str = CERTIFIED
     readings: int = 0  # another number means that the file is to be read again
     orbit: Orbit = HOME  # where the scene is seen from
+    samples: Samples = 1  # rays a pixel, once the camera is at rest
 
     def is_like(self, other: Request) -> bool:
         """Whether it differs from the other one in nothing but where the scene is seen from."""
@@ -178,7 +180,12 @@ class Renderer:
 
     def _shows(self, request: Request) -> bool:
         """Whether the request's picture is there already: as the last frame, in full."""
-        return self.drawing is not None and self.drawing.full and self.drawing.request is request
+        return (
+            self.drawing is not None
+            and self.drawing.full
+            and self.drawing.request is request
+            and (request.samples == 1 or not self.drawing.moving)
+        )
 
     def _come_to_rest(self) -> None:
         assert self.drawing is not None
@@ -201,7 +208,7 @@ class Renderer:
                 self.drawing = replace(drawing, done=done / total)
                 self._changed()
 
-        draw(plan, out=drawing.picture, progress=progress, cancelled=self._superseded)
+        draw_samples(plan, request.samples, out=drawing.picture, progress=progress, cancelled=self._superseded)
         elapsed = 1000 * (time.perf_counter() - start)
         if loaded is backend.loaded():  # else it took the time to load the compiler too
             self._pace.took(1, elapsed, plan.path_name)

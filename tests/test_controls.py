@@ -221,3 +221,15 @@ def test_the_markdown_table_has_every_row():
     table = keys_as_markdown().splitlines()
     assert len(table) == 2 + len(KEYS)
     assert all(line.count("|") == 3 for line in table)
+
+
+def test_a_goes_through_the_numbers_of_samples():
+    view = View(SCENES, stage="full")
+    seen = []
+    for _ in range(5):
+        seen.append(view.samples_of_stage)
+        view = press(view, "a")
+    assert seen == [1, 4, 16, "adaptive", 1]
+    view = press(View(SCENES, stage="edges"), "a")
+    assert (view.samples_of_stage, view.note) == (1, "stage edges has one sample a pixel")
+    assert press(view, "f").samples_of_stage == 4
