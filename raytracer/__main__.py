@@ -86,9 +86,11 @@ def chart(arguments: argparse.Namespace) -> int:
     """Measure every method, speed against accuracy, and draw the charts: about two minutes."""
     from raytracer.chart import chart as draw_charts  # loads matplotlib
     from raytracer.chart_contacts import chart_contacts
+    from raytracer.chart_samples import chart_samples
 
     with tqdm(bar_format="{desc}", leave=False, disable=None) as line:
         paths = chart_contacts(arguments.output, progress=line.set_description_str)
+        paths += chart_samples(arguments.output, progress=line.set_description_str)
         for path in [*paths, *draw_charts(arguments.output, arguments.long, progress=line.set_description_str)]:
             print(path)
     return 0

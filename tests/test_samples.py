@@ -80,3 +80,14 @@ def test_draws_into_out_and_tells_how_far_it_is():
 def test_what_there_is_not(samples, stage, message):
     with pytest.raises(ValueError, match=message):
         render_scene(MIRRORS, stage, 8, 8, samples=samples)
+
+
+def test_the_chart_is_drawn(tmp_path):
+    pytest.importorskip("matplotlib")
+    from raytracer.chart_samples import chart_samples
+
+    said = []
+    paths = chart_samples(tmp_path, said.append, size=40, rounds=1)
+    assert [path.name for path in paths] == ["chart-samples.png", "chart-samples.svg"]
+    assert len(said) == 3
+    assert "adaptive" in paths[1].read_text()
