@@ -10,6 +10,7 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -208,7 +209,8 @@ class Renderer:
                 self.drawing = replace(drawing, done=done / total)
                 self._changed()
 
-        draw_samples(plan, request.samples, out=drawing.picture, progress=progress, cancelled=self._superseded)
+        drawn = draw if request.samples == 1 else partial(draw_samples, samples=request.samples)
+        drawn(plan, out=drawing.picture, progress=progress, cancelled=self._superseded)
         elapsed = 1000 * (time.perf_counter() - start)
         if loaded is backend.loaded():  # else it took the time to load the compiler too
             self._pace.took(1, elapsed, plan.path_name)
