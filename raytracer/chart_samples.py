@@ -81,7 +81,7 @@ def _draw(points: dict[str, list[Point]], size: int) -> Figure:
     foot(
         figure,
         f"Stage full, {size} × {size} pixels, whole calls. Where a picture is fine structure all over, such as mirrors "
-        "in mirrors, nearly all pixels differ, and there is nothing to be saved.",
+        "in mirrors (scene 0), even samples are the better choice.",
     )
     return figure
 

@@ -17,8 +17,10 @@ from math import isqrt
 
 import numpy as np
 
-from raytracer.camera import Raster
+from raytracer.arrays import Hits
+from raytracer.camera import BAND_PIXELS, Raster
 from raytracer.eye import Eye
+from raytracer.image import check_fits_memory
 from raytracer.plan import Plan
 from raytracer.pool import share
 from raytracer.render import (
@@ -26,7 +28,6 @@ from raytracer.render import (
     Easel,
     Progress,
     Watch,
-    block_of,
     colours_of,
     draw,
     fitting,
@@ -34,13 +35,14 @@ from raytracer.render import (
     open_tracer,
 )
 from raytracer.screen import Screen
-from raytracer.stages import Stage
+from raytracer.stages import Block, Stage
 
 ADAPTIVE = "adaptive"
 SAMPLES = (1, 4, 16, 64, 256, ADAPTIVE)
 SIDE = 8  # of the block of samples of a pixel, where `adaptive` takes more than one
 DIFFERS = 16  # bytes by which neighbours differ that are looked at more closely
 _TILE = 64  # pixels of the large picture, along a tile's edge
+_PAINTED = 32  # pixels that a kernel paints in the memory of one that numpy is at work on
 
 Samples = int | str
 
@@ -71,15 +73,17 @@ def draw_samples(
     check_samples(samples, plan)
     if samples == 1:
         return draw(plan, threads=threads, out=out, progress=progress, cancelled=cancelled)
-    raster = plan.raster
+    raster, side = plan.raster, SIDE if samples == ADAPTIVE else isqrt(int(samples))
     size = raster.height, raster.width, 3
+    fine = replace(plan, raster=Raster(raster.camera, raster.width * side, raster.height * side, raster.sampling))
+    strip = min(_TILE, fine.raster.height) * fine.raster.width
+    check_fits_memory(raster.width, raster.height, max(strip // _PAINTED if fine.painter else strip, BAND_PIXELS))
     if samples == ADAPTIVE:
-        picture, side = draw(plan, threads=threads, out=out, cancelled=cancelled), SIDE
+        picture = draw(plan, threads=threads, out=out, cancelled=cancelled)
         wanted = differing(picture)
     else:
-        picture, side = np.empty(size, np.uint8) if out is None else fitting(out, size), isqrt(int(samples))
+        picture = np.empty(size, np.uint8) if out is None else fitting(out, size)
         wanted = np.ones(size[:2], bool)
-    fine = replace(plan, raster=Raster(raster.camera, raster.width * side, raster.height * side, raster.sampling))
     _draw_means(fine, side, wanted, picture, Watch(threads, progress, cancelled))
     return picture
 
@@ -88,14 +92,14 @@ def _draw_means(fine: Plan, side: int, wanted: np.ndarray, picture: np.ndarray, 
     """Draw the large picture, a strip at a time, and put the means of its blocks where they are wanted."""
     height = _TILE // side
     strips = [slice(row, min(row + height, len(wanted))) for row in range(0, len(wanted), height)]
-    strips = [rows for rows in strips if wanted[rows].any()]
     with open_tracer(fine, watch.threads) as tracer:
         easel = make_easel(fine, tracer, picture) if fine.painter and isinstance(tracer, Screen) else None
 
         def one(rows: slice, worker: int) -> slice:
             if watch.cancelled is not None and watch.cancelled():
                 raise Cancelled
-            _draw_strip(fine, tracer, easel, rows, side, wanted[rows], picture[rows], worker)
+            if wanted[rows].any():
+                _draw_strip(fine, tracer, easel, rows, side, wanted[rows], picture[rows], worker)
             return rows
 
         def tell(rows: slice) -> None:
@@ -125,8 +129,9 @@ def _draw_strip(
     """Draw what is wanted of some rows, bool (rows, width), into those of the picture."""
     large_rows = slice(rows.start * side, rows.stop * side)
     if easel is None:
-        large = colours_of(fine, block_of(fine, tracer, large_rows, worker))
-        picture[wanted] = _means(large, side)[wanted]
+        hits, (ys, xs) = tracer.hits(large_rows, worker), np.nonzero(wanted)
+        for few in np.array_split(np.arange(len(ys)), -(-len(ys) * side * side // BAND_PIXELS)):
+            picture[ys[few], xs[few]] = _means(fine, large_rows, hits, side, ys[few], xs[few])
         return
     kernels = easel.screen.kernels
     assert kernels.TILE_WIDTH == kernels.TILE_HEIGHT == _TILE
@@ -151,9 +156,12 @@ def _runs(wanted: np.ndarray) -> Iterator[tuple[int, int]]:
     yield from zip(ends[::2].tolist(), ends[1::2].tolist(), strict=True)
 
 
-def _means(large: np.ndarray, side: int) -> np.ndarray:
-    """The means of blocks of bytes, rounded: uint8."""
-    height, width, _ = large.shape
-    total = large.reshape(height // side, side, width // side, side, 3).sum(axis=(1, 3), dtype=np.uint32)
+def _means(fine: Plan, rows: slice, hits: Hits, side: int, ys: np.ndarray, xs: np.ndarray) -> np.ndarray:
+    """The means of the blocks of some pixels of these rows, no others being worked out: uint8 (n, 3)."""
+    steps, shape = np.arange(side), (len(ys), side, side)
+    y = np.broadcast_to((ys[:, None] * side + steps)[:, :, None], shape).reshape(-1)
+    x = np.broadcast_to((xs[:, None] * side + steps)[:, None, :], shape).reshape(-1)
+    block = Block(fine.scene, fine.raster, rows.start + y, Hits(hits.t[y, x], hits.index[y, x]), fine.lights, x)
+    total = colours_of(fine, block).reshape(len(ys), -1, 3).sum(axis=1, dtype=np.uint32)
     means: np.ndarray = ((total + side * side // 2) // (side * side)).astype(np.uint8)
     return means

@@ -66,6 +66,9 @@ def test_draws_into_out_and_tells_how_far_it_is():
     assert (out[:, :, 3] == 0).all()
     assert [done for done, _, _ in seen] == list(range(1, seen[0][1] + 1))
     assert sorted(y for _, _, rows in seen for y in range(rows.start, rows.stop)) == list(range(70))
+    seen.clear()
+    render_scene(MIRRORS, "full", 50, 70, samples=ADAPTIVE, progress=lambda *what: seen.append(what))
+    assert sorted(y for _, _, rows in seen for y in range(rows.start, rows.stop)) == list(range(70))
     for samples in (4, ADAPTIVE):
         with pytest.raises(Cancelled):
             render_scene(MIRRORS, "full", 50, 70, samples=samples, cancelled=lambda: True)
