@@ -25,7 +25,7 @@ from raytracer.bounce import (
 )
 from raytracer.certified import inner
 from raytracer.facets import planes_of
-from raytracer.scene import Light, Scene
+from raytracer.scene import Scene
 from raytracer.shading import Four, Three, cosine, highlight, land_on_any, raised_to_whole, towards
 from raytracer.twofold import Number
 from raytracer.units import scene_units
@@ -44,13 +44,14 @@ class Terms:
     bits: int  # of the largest power, if all are whole numbers, else −1
 
 
-def terms_of(scene: Scene, lights: tuple[Light, ...]) -> Terms:
+def terms_of(scene: Scene, lit: bool) -> Terms:
+    """The terms of a scene, `lit` by any light or by none."""
     table = scene.materials.table
     shiny = table[table[:, 6:9].any(axis=1)]
-    specular, powers = bool(len(shiny) and lights), shiny[:, 9]
+    specular, powers = bool(len(shiny)) and lit, shiny[:, 9]
     whole = bool(((powers == np.floor(powers)) & (powers >= 0.0) & (powers < 1 << _MOST_BITS)).all())
     bits = int(powers.max(initial=0.0)).bit_length() if whole else -1
-    return Terms(specular, bool((table[:, 10] > 0.0).any()), bool(lights) and (len(scene) > 1 or specular), bits)
+    return Terms(specular, bool((table[:, 10] > 0.0).any()), lit and (len(scene) > 1 or specular), bits)
 
 
 def surfaces_of(scene: Scene) -> np.ndarray:
@@ -112,7 +113,7 @@ class World:
 
     @cached_property
     def terms(self) -> Terms:
-        return terms_of(self.scene, self.scene.lights if self.lights else ())
+        return terms_of(self.scene, bool(self.lights))
 
     @cached_property
     def shapes(self) -> list[int]:

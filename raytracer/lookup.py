@@ -7,7 +7,7 @@ a pixel, and the boxes of pixels are those of `boxes`, widened from the corners 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from functools import lru_cache
 from types import ModuleType
 
 import numpy as np
@@ -16,16 +16,15 @@ from raytracer import plain
 from raytracer.arrays import Tree
 from raytracer.boxes import Lens, facet_boxes, make_lens
 from raytracer.camera import make_raster
-from raytracer.scene import Camera, Spheres, Triangles, Vector
+from raytracer.scene import Camera, Spheres, Triangles, Vector, vector
 
 Cells = tuple[np.ndarray, np.ndarray]  # where each cell's list begins, int64; and the numbers of shapes, int32
 
 _MOST = 512  # cells along an edge of the cube
-_KEPT = 16  # cubes and trees
+_KEPT = 8  # scenes' cubes, and trees
 _LARGE = 8.0  # times the size that half of the shapes do not exceed
 _WIDER = 2.0**-46  # of a box, and of its distance from the origin
-
-_kept: dict[tuple[int, int, Vector | None], tuple[Spheres, Triangles, Cells | Tree]] = {}
+_NO_STARTS, _NO_IDS = np.empty(0, np.int64), np.empty(0, np.int32)
 
 
 def resolution_for(shapes: int) -> int:
@@ -33,45 +32,36 @@ def resolution_for(shapes: int) -> int:
     return min(_MOST, 1 << max(0, int(np.ceil(np.log2(2.0 * np.sqrt(max(shapes, 1)))))))
 
 
+@lru_cache(maxsize=_KEPT)
 def light_cells(
-    spheres: Spheres, triangles: Triangles, balls: np.ndarray, corners: np.ndarray, light: np.ndarray, path: ModuleType
+    spheres: Spheres, triangles: Triangles, unit: int, lights: tuple[Vector, ...], path: ModuleType
 ) -> Cells:
-    """The lists of a light's cube."""
-    place = float(light[0]), float(light[1]), float(light[2])
-    cells = _keep(spheres, triangles, place, lambda: _light_cells(balls, corners, light, path))
-    assert not isinstance(cells, Tree)
-    return cells
+    """The lists of the cubes of all lights, given by their places, one cube behind the other."""
+    shapes = _in_units(spheres, triangles, unit)
+    cubes = [_light_cells(*shapes, np.ldexp(light, -unit), path) for light in lights]
+    ends = np.cumsum([0, *(len(ids) for _, ids in cubes)])
+    starts = [starts + end for (starts, _), end in zip(cubes, ends[:-1], strict=True)]
+    return np.concatenate([*starts, _NO_STARTS]), np.concatenate([*(ids for _, ids in cubes), _NO_IDS])
 
 
-def tree_of(spheres: Spheres, triangles: Triangles, balls: np.ndarray, corners: np.ndarray, path: ModuleType) -> Tree:
+@lru_cache(maxsize=_KEPT)
+def tree_of(spheres: Spheres, triangles: Triangles, unit: int, path: ModuleType) -> Tree:
     """The tree over all shapes, which are numbered as in `View.balls`."""
-    tree = _keep(spheres, triangles, None, lambda: _tree(balls, len(spheres), corners, path))
-    assert isinstance(tree, Tree)
-    return tree
-
-
-def _keep(
-    spheres: Spheres, triangles: Triangles, place: Vector | None, make: Callable[[], Cells | Tree]
-) -> Cells | Tree:
-    key = id(spheres), id(triangles), place
-    found = _kept.get(key)
-    if found is None:
-        while len(_kept) >= _KEPT:
-            _kept.pop(next(iter(_kept)), None)
-        found = _kept[key] = spheres, triangles, make()
-    return found[2]
-
-
-def _tree(balls: np.ndarray, spheres: int, corners: np.ndarray, path: ModuleType) -> Tree:
-    centres, radii = balls[:spheres, :3], balls[:spheres, 3:]
+    balls, corners = _in_units(spheres, triangles, unit)
+    centres, radii = balls[: len(spheres), :3], balls[: len(spheres), 3:]
     low = np.concatenate([centres - radii, corners.min(axis=1, initial=np.inf)])
     high = np.concatenate([centres + radii, corners.max(axis=1, initial=-np.inf)])
     wider = _WIDER * (np.abs(low) + np.abs(high)).sum(axis=1, keepdims=True)
     about = np.column_stack([(low + high) / 2.0, (high - low).max(axis=1) / 2.0])
     order = _order(path.along_curve(about), about[:, 3]) if len(about) else np.empty(0, np.int64)
     tree: Tree = path.enclose(low - wider, high + wider, order, np.empty(0))
-    ids = np.where(tree.ids >= spheres, tree.ids + (len(balls) - spheres), tree.ids)
+    ids = np.where(tree.ids >= len(spheres), tree.ids + (len(balls) - len(spheres)), tree.ids)
     return tree._replace(ids=ids.astype(np.int32))
+
+
+def _in_units(spheres: Spheres, triangles: Triangles, unit: int) -> tuple[np.ndarray, np.ndarray]:
+    """Balls and corners, counted in 2**unit (see `units`)."""
+    return np.ldexp(spheres.balls, -unit), np.ldexp(triangles.vertices, -unit)
 
 
 def _order(along: np.ndarray, sizes: np.ndarray) -> np.ndarray:
@@ -95,7 +85,7 @@ def _face_boxes(
     """The boxes of cells of all shapes on one face: int32 (shapes, 4)."""
     u, v, w = (np.zeros(3) for _ in range(3))
     u[(axis + 1) % 3], v[(axis + 2) % 3], w[axis] = 1.0, -1.0, -sign
-    camera = Camera((0.0, 0.0, 0.0), _vector(u), _vector(v), _vector(w), 90.0)
+    camera = Camera((0.0, 0.0, 0.0), vector(u), vector(v), vector(w), 90.0)
     lens = make_lens(make_raster(camera, size, size))
     spheres = _widened(plain.bound(lens, light, balls)[0], size)
     return np.concatenate([spheres, _triangles(lens, light, corners, size)]) if len(corners) else spheres
@@ -117,8 +107,3 @@ def _widened(boxes: np.ndarray, size: int) -> np.ndarray:
     hidden = (right == 0) & (left == 0) & (top == 0) & (bottom == 0)
     wide = np.stack([np.maximum(left - 1, 0), right, np.maximum(top - 1, 0), bottom], axis=-1)
     return np.where(hidden[:, None], 0, wide).astype(np.int32)
-
-
-def _vector(x: np.ndarray) -> Vector:
-    a, b, c = x.tolist()
-    return a, b, c

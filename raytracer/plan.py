@@ -55,7 +55,7 @@ class Plan:
     @property
     def _tests_beyond_the_eye(self) -> int:
         """About how many tests of a ray against a shape it takes to throw light on, where every shape is tested."""
-        terms, lights = terms_of(self.scene, self.lights), len(self.lights)
+        terms, lights = terms_of(self.scene, bool(self.lights)), len(self.lights)
         shadow_rays = lights * terms.shadows
         rays = shadow_rays + _REFLECTIONS * terms.mirrors * (1 + shadow_rays)
         return self.raster.width * self.raster.height * len(self.scene) * rays // _TESTS_FOR_ONE
@@ -150,7 +150,7 @@ def _reasons(plan: Plan) -> Iterator[str]:
 
 
 def _reasons_for_terms(scene: Scene, lights: tuple[Light, ...]) -> Iterator[str]:
-    terms = terms_of(scene, lights)
+    terms = terms_of(scene, bool(lights))
     if terms.shadows:
         yield "a shadow ray to each light that a surface faces: the light's own cells say which shapes may be between"
     elif lights:

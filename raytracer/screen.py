@@ -322,25 +322,20 @@ def make_paints(plan: Plan, screen: Screen) -> Paints:
 def make_full_paints(plan: Plan, screen: Screen) -> FullPaints:
     """What the stage `full` is painted with."""
     scene, paints = plan.scene, make_paints(plan, screen)
-    terms, (_, _, balls, corners) = terms_of(scene, plan.lights), scene_units(scene)
-    cells = [
-        light_cells(
-            scene.spheres, scene.triangles, balls, corners, np.ldexp(light.position, -screen.unit), screen.kernels
-        )
-        for light in (plan.lights if terms.shadows else ())
-    ]
-    ends = np.cumsum([0, *(len(ids) for _, ids in cells)])
-    starts = [starts + end for (starts, _), end in zip(cells, ends[:-1], strict=True)]
+    terms, shapes, corners = (
+        terms_of(scene, bool(plan.lights)),
+        (scene.spheres, scene.triangles),
+        screen.targets.corners,
+    )
+    lights = tuple(light.position for light in plan.lights) if terms.shadows else ()
     return FullPaints(
         paints.background, scene.background, paints.lights, surfaces_of(scene).reshape(-1),
-        corners_of(screen.origin, corners).reshape(-1), np.concatenate([*starts, _NO_STARTS]),
-        np.concatenate([*(ids for _, ids in cells), _NO_IDS]), resolution_for(len(balls) + len(corners)),
-        tree_of(scene.spheres, scene.triangles, balls, corners, screen.kernels), terms.bits, terms.specular,
-        terms.shadows, terms.mirrors,
+        corners_of(screen.origin, corners).reshape(-1), *light_cells(*shapes, screen.unit, lights, screen.kernels),
+        resolution_for(len(screen.targets.balls) + len(corners)), tree_of(*shapes, screen.unit, screen.kernels),
+        terms.bits, terms.specular, terms.shadows, terms.mirrors,
     )  # fmt: skip
 
 
-_NO_STARTS, _NO_IDS = np.empty(0, np.int64), np.empty(0, np.int32)
 _NO_PAINTS = Paints(np.zeros(3), np.zeros(3), np.empty((0, 6)), Materials().diffuse.reshape(-1))
 
 

@@ -103,6 +103,18 @@ def test_many_shapes_are_looked_up_as_if_all_were_tested(monkeypatch):
     np.testing.assert_array_equal(*pictures)
 
 
+@both_paths
+def test_what_is_kept_of_shapes_is_not_taken_for_another_unit_of_length():
+    """An eye so far away that all lengths are scaled: the tree of the same shapes, unscaled, is of no use to it."""
+    shapes = "".join(f"sphere 4e47 {x}e48 {y}e48 -4e48\n" for x in (-1, 0, 1) for y in (-1, 0, 1))
+    scene = interpret("light 3e48 5e48 4e48 .7 .7 .7\nsurface .5 .4 .3 .1 .1 .1 .2 .2 .2 9 .5\n" + shapes)
+    for eye, fov in (((0.0, 0.0, 4e48), 60.0), ((0.0, 0.0, 1.5e50), 2.0), ((0.0, 0.0, 4e48), 60.0)):
+        seen = replace(scene, camera=Camera(eye=eye, fov=fov))
+        np.testing.assert_array_equal(
+            *(draw(make_plan(seen, "full", 120, 120, path=PATHS[path])) for path in ("numpy", "compiled"))
+        )
+
+
 SURFACE = "surface .5 .5 .5 .1 .1 .1 {shiny} {power} {mirror}\n"
 
 
@@ -113,7 +125,7 @@ def scene_of(lights="light 0 5 5 1 1 1\n", shiny="0 0 0", power=1, mirror=0, sha
 def test_terms_that_a_scene_does_not_use_are_left_out():
     def terms(**given):
         scene = scene_of(**given)
-        return terms_of(scene, scene.lights)
+        return terms_of(scene, bool(scene.lights))
 
     plain = terms()
     assert (plain.specular, plain.mirrors, plain.shadows) == (False, False, False)
