@@ -194,6 +194,7 @@ class Tree(NamedTuple):
 
 
 FACET = 24  # numbers a triangle, of which some are to spare
+CORNERS = 12  # numbers a triangle at the stage `full`: its corners, how far away they are, and some to spare
 
 
 class View(NamedTuple):

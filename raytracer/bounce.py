@@ -33,13 +33,7 @@ MOST_REFLECTIONS = 10
 
 def blocks_sphere(o: Three, d: Three, a: Number, over_a: Number, radius: Number, size: Number, own: Number) -> Number:
     """Whether a sphere stands between P and P + D, o = P − C; size is at least |P|; `own` where P is on it."""
-    h, square, r2 = (
-        inner(d[0], d[1], d[2], o[0], o[1], o[2]),
-        inner(o[0], o[1], o[2], o[0], o[1], o[2]),
-        radius * radius,
-    )
-    c = square - r2
-    c = select(own | (abs(c) <= LEAVING * (square + r2 + radius * size)), 0.0, c)
+    h, c, r2 = _line(o, d, radius, size, own)
     beyond = (a + h) + (h + c)  # c as seen from P + D
     enters = (c > 0.0) & (h < 0.0) & (_beside(h * over_a, o, d) <= r2) & ((beyond < 0.0) | (-h < a))
     leaves = (c <= 0.0) & (beyond > 0.0) & ((c < 0.0) | (h < 0.0))
@@ -58,13 +52,7 @@ def hits_sphere(
     o: Three, d: Three, a: Number, over_a: Number, radius: Number, size: Number, own: Number, from_outside: Number
 ) -> tuple[Number, Number, Number, Number]:
     """What `meet_sphere` asks first: whether the ray hits; and h, c and h² − a·c for `sphere_hit_at`."""
-    h, square, r2 = (
-        inner(d[0], d[1], d[2], o[0], o[1], o[2]),
-        inner(o[0], o[1], o[2], o[0], o[1], o[2]),
-        radius * radius,
-    )
-    c = square - r2
-    c = select(own | (abs(c) <= LEAVING * (square + r2 + radius * size)), 0.0, c)
+    h, c, r2 = _line(o, d, radius, size, own)
     half, on = r2 - _beside(h * over_a, o, d), c == 0.0
     hit = (on | (half >= 0.0)) & ((h < 0.0) | (c < 0.0)) & ~(own & from_outside)
     return hit, h, c, select(on, h * h, a * half)
@@ -76,10 +64,23 @@ def sphere_hit_at(h: Number, c: Number, disc: Number, over_a: Number) -> Number:
     return select((h < 0.0) & (c <= 0.0), q * over_a, abs(c) / q)
 
 
+def _line(o: Three, d: Three, radius: Number, size: Number, own: Number) -> Three:
+    """h, c and r²; c is 0 where P cannot be told from a point of the sphere."""
+    square, r2 = inner(o[0], o[1], o[2], o[0], o[1], o[2]), radius * radius
+    c = square - r2
+    c = select(own | (abs(c) <= LEAVING * (square + r2 + radius * size)), 0.0, c)
+    return inner(d[0], d[1], d[2], o[0], o[1], o[2]), c, r2
+
+
 def _beside(s: Number, o: Three, d: Three) -> Number:
     """The squared distance of a sphere's centre from the ray's line."""
     x, y, z = o[0] - s * d[0], o[1] - s * d[1], o[2] - s * d[2]
     return x * x + y * y + z * z
+
+
+def away_from(row: Four, p: Three, eye: Three) -> Three:
+    """P − C for a sphere's row, its centre being in the scene's place, P as seen from the eye."""
+    return p[0] + (eye[0] - row[0]), p[1] + (eye[1] - row[1]), p[2] + (eye[2] - row[2])
 
 
 def plane_ahead(p: Three, d: Three, plane: Four, reach: Number, size: Number, own: Number) -> tuple[Number, Number]:
@@ -109,6 +110,11 @@ def _volume(d: Three, a: Three, b: Three) -> Number:
     return d[0] * x + d[1] * y + d[2] * z
 
 
+def size_of(p: Three) -> Number:
+    """At least |P|."""
+    return abs(p[0]) + abs(p[1]) + abs(p[2])
+
+
 def reflected(d: Three, n: Three, radius: Number) -> tuple[Three, Number]:
     """D + 2 (N·−D) N, and N·D, for n = r·N."""
     facing = inner(d[0], d[1], d[2], n[0], n[1], n[2])
@@ -119,7 +125,7 @@ def reflected(d: Three, n: Three, radius: Number) -> tuple[Three, Number]:
 def land_again(t: Number, p: Three, d: Three, row: Four, eye: Three, flat: Number) -> tuple[Three, Three, Number]:
     """`shading.land_on_any` of a ray from P; a triangle faces where the ray comes from."""
     x, y, z, w = row
-    step, n = land(t, d, (p[0] + (eye[0] - x), p[1] + (eye[1] - y), p[2] + (eye[2] - z)), w)
+    step, n = land(t, d, away_from(row, p, eye), w)
     slope = inner(x, y, z, d[0], d[1], d[2])
     along, side = (w - inner(x, y, z, p[0], p[1], p[2])) / slope, select(slope > 0.0, -1.0, 1.0)
     step = (

@@ -14,23 +14,24 @@ from functools import cached_property
 
 import numpy as np
 
+from raytracer.arrays import CORNERS
 from raytracer.bounce import (
     MOST_REFLECTIONS,
+    away_from,
     blocks_sphere,
     land_again,
     meet_sphere,
     plane_ahead,
     reflected,
+    size_of,
     within_edges,
 )
 from raytracer.certified import inner
 from raytracer.facets import planes_of
 from raytracer.scene import Scene
-from raytracer.shading import Four, Three, cosine, highlight, land_on_any, raised_to_whole, towards
-from raytracer.twofold import Number
+from raytracer.shading import Four, Three, cosine, highlight, land_on_any, raised_to_whole, towards, unit_of
 from raytracer.units import scene_units
 
-CORNERS = 12  # numbers a triangle: its corners, how far away they are, and some to spare
 _MOST_BITS = 12  # of a power that is worked out by squaring
 
 
@@ -160,7 +161,7 @@ class World:
         shiny: np.ndarray,
     ) -> np.ndarray:
         """What all lights add: (n, 3)."""
-        total, size, unit = np.zeros((len(where), 3)), reach(p), unit_of(d)
+        total, size, unit = np.zeros((len(where), 3)), size_of(p), unit_of(d)
         for place, colour in self.lights:
             shine, spark = self.answers(p, n, radius, unit, place, diffuse[:, 3])
             lit = (shine > 0.0) | (spark > 0.0)
@@ -188,7 +189,7 @@ class World:
         for j in self.shapes:
             own, row = where == j, self.rows[j]
             if j < self.first_facet:
-                blocked |= blocks_sphere(self.away(p, row), d, a, over_a, row[3], size, own)
+                blocked |= blocks_sphere(away_from(tuple(row), p, self.eye), d, a, over_a, row[3], size, own)
             else:
                 over, under = plane_ahead(p, d, tuple(row), self.corners[j - self.first_facet, 9], size, own)
                 between = (over > 0.0) & (over < under)
@@ -201,12 +202,12 @@ class World:
     ) -> tuple[np.ndarray, np.ndarray]:
         """What rays from P hit first: t and the numbers of shapes, −1 for none."""
         best, index = np.full(len(where), np.inf), np.full(len(where), -1, np.int32)
-        a, size = inner(*d, *d), reach(p)
+        a, size = inner(*d, *d), size_of(p)
         over_a = 1.0 / a
         for j in self.shapes:
             own, row = where == j, self.rows[j]
             if j < self.first_facet:
-                t = meet_sphere(self.away(p, row), d, a, over_a, row[3], size, own, from_outside)
+                t = meet_sphere(away_from(tuple(row), p, self.eye), d, a, over_a, row[3], size, own, from_outside)
                 closer = t < best
             else:
                 over, under = plane_ahead(p, d, tuple(row), self.corners[j - self.first_facet, 9], size, own)
@@ -217,25 +218,10 @@ class World:
             best, index = np.where(closer, t, best), np.where(closer, np.int32(j), index)
         return best, index
 
-    def away(self, p: Three, row: np.ndarray | Three) -> Three:
-        """P − C, for a sphere's row, or for the columns of many."""
-        eye = self.eye
-        return p[0] + (eye[0] - row[0]), p[1] + (eye[1] - row[1]), p[2] + (eye[2] - row[2])
-
     def _within(self, j: int, p: Three, d: Three) -> np.ndarray:
         ax, ay, az, bx, by, bz, cx, cy, cz, *_ = self.corners[j - self.first_facet].tolist()
         within: np.ndarray = within_edges(p, d, (ax, ay, az), (bx, by, bz), (cx, cy, cz))
         return within
-
-
-def reach(p: Three) -> Number:
-    """At least |P|."""
-    return abs(p[0]) + abs(p[1]) + abs(p[2])
-
-
-def unit_of(d: Three) -> Three:
-    over = 1.0 / np.sqrt(inner(*d, *d))
-    return d[0] * over, d[1] * over, d[2] * over
 
 
 def _some(vectors: Three, which: np.ndarray) -> Three:

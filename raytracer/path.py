@@ -16,17 +16,19 @@ import numpy as np
 
 from raytracer.bounce import (
     MOST_REFLECTIONS,
+    away_from,
     blocks_sphere,
     land_again,
     meet_sphere,
     plane_ahead,
     reflected,
+    size_of,
     within_edges,
 )
 from raytracer.certified import inner
-from raytracer.full import World, reach, unit_of
+from raytracer.full import World
 from raytracer.scene import Colour, Light, Shape, Vector, vector
-from raytracer.shading import Three, highlight, land_on_any, towards
+from raytracer.shading import Three, highlight, land_on_any, towards, unit_of
 from raytracer.stages import Block
 
 
@@ -170,9 +172,9 @@ def _meet_all(
     world: World, p: Three, d: Three, where: np.ndarray, from_outside: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """t of a ray from P on shape `where` for each shape, +inf for none; which stand between P and P + D: (shapes,)."""
-    first, planes, a, size = world.first_facet, world.rows[world.first_facet :].T, inner(*d, *d), reach(p)
+    first, planes, a, size = world.first_facet, world.rows[world.first_facet :].T, inner(*d, *d), size_of(p)
     x, y, z, radius = world.rows[:first].T
-    own, o = where == np.arange(len(world.rows)), world.away(p, (x, y, z))
+    own, o = where == np.arange(len(world.rows)), away_from((x, y, z, radius), p, world.eye)
     t = meet_sphere(o, d, a, 1.0 / a, radius, size, own[:first], from_outside)
     blocks = blocks_sphere(o, d, a, 1.0 / a, radius, size, own[:first])
     over, under = plane_ahead(

@@ -42,6 +42,12 @@ def land_on_any(t: Number, d: Three, eye: Three, row: Four, flat: Number) -> tup
     return p, n, select(flat, 1.0, w)
 
 
+def unit_of(d: Three) -> Three:
+    """D, of length 1."""
+    over = 1.0 / np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
+    return d[0] * over, d[1] * over, d[2] * over
+
+
 def towards(p: Three, n: Three, light: Three) -> tuple[Number, Number]:
     """n·T and T·T for T from the point P to a light, both as seen from the eye."""
     x, y, z = light[0] - p[0], light[1] - p[1], light[2] - p[2]

@@ -5,7 +5,7 @@ from raytracer.kernels.compiler import cache_named_after_sources
 with cache_named_after_sources():
     from raytracer.kernels.bounds import TILE_HEIGHT, TILE_WIDTH, begin, bound, count, fill
     from raytracer.kernels.bvh import along_curve, build, candidates_in_tree, enclose, nearest_in_tree
-    from raytracer.kernels.full import CORNERS, radiance_of, sort_into_cells
+    from raytracer.kernels.full import radiance_of, sort_into_cells
     from raytracer.kernels.reading import read_plain
     from raytracer.kernels.tiles import (
         find_fine_hits,
@@ -23,7 +23,6 @@ with cache_named_after_sources():
     from raytracer.kernels.whole import mean_of_blocks, paint_depth, paint_edges, range_of
 
 __all__ = [
-    "CORNERS",
     "STRIDE",
     "TILE_HEIGHT",
     "TILE_WIDTH",

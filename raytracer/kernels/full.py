@@ -10,13 +10,16 @@ Eight rays stay together however their ways part; those that are done are only n
 
 import numpy as np
 
+from raytracer.arrays import CORNERS
 from raytracer.bounce import (
     MOST_REFLECTIONS,
+    away_from,
     blocks_sphere,
     hits_sphere,
     land_again,
     plane_ahead,
     reflected,
+    size_of,
     sphere_hit_at,
     within_edges,
 )
@@ -38,10 +41,9 @@ from raytracer.kernels.lanes import (
     store,
     whole,
 )
-from raytracer.shading import cosine, highlight, land_on_any, raised_to_whole, towards
+from raytracer.shading import cosine, highlight, land_on_any, raised_to_whole, towards, unit_of
 from raytracer.twofold import select
 
-CORNERS = 12  # numbers a triangle: its corners, how far away they are, and some to spare
 _LONGER = 1.0 + 2.0**-40
 
 
@@ -50,11 +52,11 @@ def radiance(view, paints, t, d, where, scratch):
     """The colours that come along eight eye rays D from hits at t on the shapes at these places."""
     p, n, radius = land_on_any(t, d, view.eye, gather_rows(view.balls, where), at_least(where, view.first_facet))
     red, green, blue, weight = spread(0.0), spread(0.0), spread(0.0), spread(1.0)
-    background, a = paints.behind, inner(d[0], d[1], d[2], d[0], d[1], d[2])
+    background = paints.behind
     for bounce in range(MOST_REFLECTIONS + 1):
         material, shown = spread(np.int32(3)) * gather(view.material, where), weight > 0.0
         ambient = gather_rows(paints.surfaces, material + spread(np.int32(1)))
-        light = _light(view, paints, p, n, radius, d, a, where, shown, material)
+        light = _light(view, paints, p, n, radius, d, where, shown, material)
         red = red + select(shown, weight * (ambient[0] + light[0]), 0.0)
         green = green + select(shown, weight * (ambient[1] + light[1]), 0.0)
         blue = blue + select(shown, weight * (ambient[2] + light[2]), 0.0)
@@ -62,8 +64,7 @@ def radiance(view, paints, t, d, where, scratch):
         if bounce == MOST_REFLECTIONS or not paints.mirrors or not any_of(weight > 0.0):
             break
         d, facing = reflected(d, n, radius)
-        a = inner(d[0], d[1], d[2], d[0], d[1], d[2])
-        t, found = _nearest(view, paints, p, d, a, where, facing < 0.0, weight > 0.0, scratch)
+        t, found = _nearest(view, paints, p, d, where, facing < 0.0, weight > 0.0, scratch)
         missed = (weight > 0.0) & ~is_hit(found)
         red = red + select(missed, weight * background[0], 0.0)
         green = green + select(missed, weight * background[1], 0.0)
@@ -78,13 +79,12 @@ def radiance(view, paints, t, d, where, scratch):
 
 
 @inlined
-def _light(view, paints, p, n, radius, d, a, where, shown, material):
+def _light(view, paints, p, n, radius, d, where, shown, material):
     """What all lights add, where it is shown."""
     red, green, blue, spark, lights = spread(0.0), spread(0.0), spread(0.0), spread(0.0), paints.lights
     dr, dg, db, power = gather_rows(paints.surfaces, material)
     sr, sg, sb, _ = gather_rows(paints.surfaces, material + spread(np.int32(2)))
-    over, size = 1.0 / np.sqrt(a), abs(p[0]) + abs(p[1]) + abs(p[2])
-    unit = d[0] * over, d[1] * over, d[2] * over
+    size, unit = size_of(p), unit_of(d)
     for i in range(np.uint64(len(lights))):
         light = lights[i, 0], lights[i, 1], lights[i, 2]
         facing, square = towards(p, n, light)
@@ -139,13 +139,11 @@ def _cell(resolution, d):
 @inlined
 def _blocks(view, paints, j, p, d, a, over_a, where, size):
     """Whether shape j stands between P and P + D."""
-    row, own, eye = np.uint64(4) * np.uint64(j), equal_to(where, np.int64(j)), view.eye
-    x, y, z, w = _row(view.balls, row)
+    row, own = _row(view.balls, np.uint64(4) * np.uint64(j)), equal_to(where, np.int64(j))
     if j < view.first_facet:
-        o = p[0] + (eye[0] - x), p[1] + (eye[1] - y), p[2] + (eye[2] - z)
-        return blocks_sphere(o, d, a, over_a, w, size, own)
+        return blocks_sphere(away_from(row, p, view.eye), d, a, over_a, row[3], size, own)
     corners, at = paints.corners, np.uint64(CORNERS) * np.uint64(j - view.first_facet)
-    over, under = plane_ahead(p, d, (x, y, z, w), corners[at + np.uint64(9)], size, own)
+    over, under = plane_ahead(p, d, row, corners[at + np.uint64(9)], size, own)
     between = (over > 0.0) & (over < under)
     if any_of(between):
         between = between & _within(corners, at, p, d)
@@ -161,10 +159,11 @@ def _within(corners, at, p, d):
 
 
 @inlined
-def _nearest(view, paints, p, d, a, where, from_outside, asked, scratch):
+def _nearest(view, paints, p, d, where, from_outside, asked, scratch):
     """What rays from P on the shapes at these places hit first."""
-    best, index, over_a, size = spread(np.inf), spread(np.int32(-1)), 1.0 / a, abs(p[0]) + abs(p[1]) + abs(p[2])
-    best, tree, stack, near, top = select(asked, best, -np.inf), paints.tree, scratch.stack, scratch.near, 0
+    a, index, size = inner(d[0], d[1], d[2], d[0], d[1], d[2]), spread(np.int32(-1)), size_of(p)
+    over_a, best = 1.0 / a, select(asked, spread(np.inf), -np.inf)
+    tree, stack, near, top = paints.tree, scratch.stack, scratch.near, 0
     over_d = 1.0 / d[0], 1.0 / d[1], 1.0 / d[2]
     top = _push(tree, view.eye, p, over_d, best, tree.depth - 1, 0, stack, near, top)
     while top > 0:
@@ -213,17 +212,15 @@ def _push(tree, eye, p, over_d, best, level, first, stack, near, top):
 @inlined
 def _meet(view, paints, j, p, d, a, over_a, where, size, from_outside):
     """Where rays meet shape j, +inf where they do not."""
-    row, own, eye = np.uint64(4) * np.uint64(j), equal_to(where, np.int64(j)), view.eye
-    x, y, z, w = _row(view.balls, row)
+    row, own = _row(view.balls, np.uint64(4) * np.uint64(j)), equal_to(where, np.int64(j))
     if j < view.first_facet:
-        o = p[0] + (eye[0] - x), p[1] + (eye[1] - y), p[2] + (eye[2] - z)
-        hit, h, c, disc = hits_sphere(o, d, a, over_a, w, size, own, from_outside)
+        hit, h, c, disc = hits_sphere(away_from(row, p, view.eye), d, a, over_a, row[3], size, own, from_outside)
         t = spread(np.inf)
         if any_of(hit):
             t = select(hit, sphere_hit_at(h, c, disc, over_a), np.inf)
         return t
     corners, at = paints.corners, np.uint64(CORNERS) * np.uint64(j - view.first_facet)
-    over, under = plane_ahead(p, d, (x, y, z, w), corners[at + np.uint64(9)], size, own)
+    over, under = plane_ahead(p, d, row, corners[at + np.uint64(9)], size, own)
     ahead = over > 0.0
     if any_of(ahead):
         ahead = ahead & _within(corners, at, p, d)
@@ -265,7 +262,7 @@ def sort_into_cells(boxes, resolution):
 def radiance_of(view, paints, t, index, columns, rows, scratch, colours):
     """The colours of single hits, float64 (n, 3): t, index and pixels are arrays of whole eights."""
     u, v, back = view.u, view.v, view.back
-    for k in range(np.uint64(0), np.uint64(len(t)), np.uint64(8)):
+    for k in range(np.uint64(0), np.uint64(len(t)), np.uint64(WIDTH)):
         across, up = gather(view.across, load(columns, k)), gather(view.up, load(rows, k))
         d = (
             across * u[0] + (up * v[0] - back[0]),
@@ -274,8 +271,8 @@ def radiance_of(view, paints, t, index, columns, rows, scratch, colours):
         )
         red, green, blue = radiance(view, paints, load(t, k), d, load(index, k), scratch)
         store(scratch.batch, 0, red)
-        store(scratch.batch, 8, green)
-        store(scratch.batch, 16, blue)
-        for lane in range(8):
+        store(scratch.batch, WIDTH, green)
+        store(scratch.batch, 2 * WIDTH, blue)
+        for lane in range(WIDTH):
             for colour in range(3):
-                colours[k + np.uint64(lane), colour] = scratch.batch[8 * colour + lane]
+                colours[k + np.uint64(lane), colour] = scratch.batch[WIDTH * colour + lane]
