@@ -213,7 +213,7 @@ class View(NamedTuple):
     eye: tuple[float, float, float]
     balls: np.ndarray  # float64, flat: x, y, z, radius of each sphere, then `Facets.planes`
     material: np.ndarray  # int32: of each of those rows, a row of `Paints.colours`
-    facets: np.ndarray  # float64, flat: FACET numbers a triangle, see `screen.pack_facets`
+    facets: np.ndarray  # float64, flat: FACET numbers a triangle, see `screen`
     first_facet: int  # the number of the first triangle
 
 

@@ -25,6 +25,7 @@ from typing import NamedTuple
 
 Exact = float | Fraction  # a finite float64 stands for itself, exactly
 
+Whole = tuple[int, int, int]  # a vector
 Surd = tuple[int, int, int, int]  # (base + sign · √radicand) / divisor, all of them integers, divisor above 0
 
 _MANTISSA = 53  # a float64's bits
@@ -146,11 +147,11 @@ def side(origin: Sequence[Exact], centre: Sequence[Exact], radius: Exact) -> Fra
     return sum((x * x for x in distances), Fraction(0)) - Fraction(radius) ** 2
 
 
-def volume(origin: Sequence[Exact], corners: Sequence[Sequence[Exact]]) -> Fraction:
-    """V = a·(b × c): 0 if the origin lies in the triangle's plane."""
-    a, b, c = ([Fraction(x) - Fraction(o) for x, o in zip(corner, origin, strict=True)] for corner in corners)
-    x, y, z = b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]
-    return a[0] * x + a[1] * y + a[2] * z
+def volume(origin: Sequence[float], corners: Sequence[float]) -> Fraction:
+    """V = a·(b × c) of three corners, nine numbers: 0 if the origin lies in the triangle's plane."""
+    numbers, unit = _integers([*origin, *corners])
+    found, _ = _volume_and_sides(numbers[:3], numbers[3:])
+    return Fraction(found, unit**3)
 
 
 def has_area(corners: Sequence[float]) -> bool:
@@ -177,19 +178,8 @@ def _hit(eye: list[int], steps: list[int], a: int, sphere: list[int]) -> Surd | 
 
 def _hit_triangle(eye: list[int], steps: list[int], a: int, corners: list[int]) -> Surd | None:
     """Where the ray meets a triangle, but for the same factor."""
-    ox, oy, oz = eye
-    dx, dy, dz = steps
-    ax, ay, az, bx, by, bz, cx, cy, cz = corners
-    ax, ay, az, bx, by, bz, cx, cy, cz = ax - ox, ay - oy, az - oz, bx - ox, by - oy, bz - oz, cx - ox, cy - oy, cz - oz
-    x, y, z = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
-    volume, first = ax * x + ay * y + az * z, dx * x + dy * y + dz * z
-    second = dx * (cy * az - cz * ay) + dy * (cz * ax - cx * az) + dz * (cx * ay - cy * ax)
-    third = dx * (ay * bz - az * by) + dy * (az * bx - ax * bz) + dz * (ax * by - ay * bx)
-    if volume < 0:
-        volume, first, second, third = -volume, -first, -second, -third
-    if volume == 0 or first < 0 or second < 0 or third < 0:
-        return None
-    return volume * a, 1, 0, first + second + third
+    found = _seen_triangle(_facing(eye, corners, 1), steps)
+    return None if found is None else (found[0] * a, *found[1:])
 
 
 class SeenSphere(NamedTuple):
@@ -204,7 +194,7 @@ class SeenTriangle(NamedTuple):
     """A triangle as seen from an origin, in integers: what rays from there share."""
 
     volume: int  # V, not below 0; 0 if the origin lies in its plane, so that no ray meets it
-    sides: tuple[tuple[int, int, int], ...]  # b × c, c × a, a × b, with V's sign
+    sides: tuple[Whole, ...]  # b × c, c × a, a × b, with V's sign
     unit: int  # how many of them make 1, in length
 
 
@@ -216,13 +206,22 @@ def seen_from(origin: Sequence[float], shape: Sequence[float]) -> Seen:
     numbers, unit = _integers([*origin, *shape])
     if len(shape) == 4:
         return SeenSphere(numbers[:3], numbers[3:], unit)
-    ox, oy, oz, *corners = numbers
+    return _facing(numbers[:3], numbers[3:], unit)
+
+
+def _facing(eye: list[int], corners: list[int], unit: int) -> SeenTriangle:
+    found, sides = _volume_and_sides(eye, corners)
+    if found < 0:
+        found, sides = -found, tuple((-x, -y, -z) for x, y, z in sides)
+    return SeenTriangle(found, sides, unit)
+
+
+def _volume_and_sides(eye: list[int], corners: list[int]) -> tuple[int, tuple[Whole, ...]]:
+    """a·(b × c), and b × c, c × a, a × b."""
+    ox, oy, oz = eye
     a, b, c = ((x - ox, y - oy, z - oz) for x, y, z in zip(corners[::3], corners[1::3], corners[2::3], strict=True))
-    sides = _cross(b, c), _cross(c, a), _cross(a, b)
-    volume = a[0] * sides[0][0] + a[1] * sides[0][1] + a[2] * sides[0][2]
-    if volume < 0:
-        volume, sides = -volume, (_negative(sides[0]), _negative(sides[1]), _negative(sides[2]))
-    return SeenTriangle(volume, sides, unit)
+    x, y, z = side = _cross(b, c)
+    return a[0] * x + a[1] * y + a[2] * z, (side, _cross(c, a), _cross(a, b))
 
 
 def nearest_seen(shapes: Sequence[Seen], direction: Sequence[int], unit: int) -> tuple[float, int]:
@@ -253,12 +252,8 @@ def _seen_triangle(shape: SeenTriangle, steps: list[int]) -> Surd | None:
     return shape.volume, 1, 0, total * shape.unit
 
 
-def _cross(a: tuple[int, int, int], b: tuple[int, int, int]) -> tuple[int, int, int]:
+def _cross(a: Whole, b: Whole) -> Whole:
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-def _negative(a: tuple[int, int, int]) -> tuple[int, int, int]:
-    return -a[0], -a[1], -a[2]
 
 
 def _roots(

@@ -200,7 +200,7 @@ def usable_spread(raster: Raster) -> float:
 
 def count_tests(boxes: np.ndarray, raster: Raster) -> np.ndarray:
     """In how many boxes (s, 4) each pixel lies: int32 (height, width)."""
-    left, right, top, bottom = boxes[(boxes[:, 0] < boxes[:, 1]) & (boxes[:, 2] < boxes[:, 3])].T
+    left, right, top, bottom = boxes[_not_empty(boxes)].T
     width, size = raster.width + 1, (raster.height + 1) * (raster.width + 1)
     steps = np.zeros(size, np.int64)
     for row, column, step in ((top, left, 1), (top, right, -1), (bottom, left, -1), (bottom, right, 1)):

@@ -19,25 +19,26 @@ import numpy as np
 
 from raytracer import exact
 from raytracer.arrays import Facets, Grid, Nearest, Rays, TwofoldRays, View
-from raytracer.certified import FACET_ERROR, K_ERROR, LARGEST, SMALLEST, STEEP, Three, nearer
+from raytracer.certified import FACET_ERROR, K_ERROR, LARGEST, SMALLEST, STEEP, Three
+from raytracer.plain import update
 from raytracer.scene import Camera, vector
 from raytracer.twofold import Twofold, add, divide, dot, multiply, two_sum
 
 _NEXT = [1, 2, 0]
 
 TwofoldVector = tuple[Twofold, Twofold, Twofold]
+Measures = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
 def see_facets(grid: Grid | View, kappa: float, origin: np.ndarray, corners: np.ndarray) -> Facets:
     """All triangles (n, 3, 3) as seen from an origin (3,), for the rays of a picture; κ as for `plain.see`."""
-    a, edges = corners - origin, corners[:, _NEXT] - corners
-    sizes, lengths = _length(a), _length(edges)
-    volume, known, planes = _planes(origin, corners)
+    measures = a, edges, sizes, lengths, normals = _measure(origin, corners)
+    volume, known, planes = _planes(origin, corners, measures)
     known &= kappa > 0.0
     extent = (lengths[:, 0] * lengths[:, 1])[:, None]
     sign, scale = np.sign(volume)[:, None], np.where(known, 1.0 / grid.reach, 0.0)[:, None]
     sides = np.cross(a, edges) * (sign * scale / (sizes * lengths))[:, :, None]
-    vectors = np.concatenate([sides, (normals_of(corners) * (sign * scale / extent))[:, None]], axis=1)
+    vectors = np.concatenate([sides, (normals * (sign * scale / extent))[:, None]], axis=1)
     rows = np.where(known[:, None, None], vectors @ np.array([grid.u, grid.v, np.negative(grid.back)]).T, 0.0)
     distance = np.where(known, np.abs(volume) * (scale / extent)[:, 0], 0.0)
     return Facets(rows.reshape(len(a), 12), distance, planes, volume != 0.0)
@@ -57,13 +58,18 @@ def true_zeros(origin: np.ndarray, corners: np.ndarray, camera: Camera) -> np.nd
 
 def planes_of(origin: np.ndarray, corners: np.ndarray) -> np.ndarray:
     """The planes of triangles (n, 3, 3) as seen from an origin (3,): see `Facets.planes`."""
-    return _planes(origin, corners)[2]
+    return _planes(origin, corners, _measure(origin, corners))[2]
 
 
-def _planes(origin: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _measure(origin: np.ndarray, corners: np.ndarray) -> Measures:
+    """Corners from the origin, edges, how long these are, and normals."""
+    a, edges = corners - origin, corners[:, _NEXT] - corners
+    return a, edges, _length(a), _length(edges), normals_of(corners)
+
+
+def _planes(origin: np.ndarray, corners: np.ndarray, measures: Measures) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """V, whether all lengths are of a usual size, and the planes."""
-    a, edges, normals = corners - origin, corners[:, _NEXT] - corners, normals_of(corners)
-    sizes, lengths = _length(a), _length(edges)
+    a, _, sizes, lengths, normals = measures
     nearest = a[np.arange(len(a)), np.argmin(sizes, axis=1)]
     volume, most = _dot(normals, nearest), lengths[:, 0] * lengths[:, 1] * sizes.min(axis=1)
     usual = (sizes > SMALLEST) & (sizes < LARGEST) & (lengths > SMALLEST) & (lengths < LARGEST)
@@ -97,14 +103,7 @@ def nearest_facets(origins: np.ndarray, rays: Rays, corners: np.ndarray, nearest
     """
     direction = np.stack(rays[:3], axis=-1)
     for i, triangle in enumerate(corners):
-        t, error, low = _meet(origins, direction, rays.reach, triangle)
-        found = nearer(*_so_far(nearest), t, 0.0, error, low, number + i)
-        for array, value in zip(nearest, (found[0], *found[2:]), strict=True):
-            array[...] = value
-
-
-def _so_far(nearest: Nearest) -> tuple[np.ndarray, float, np.ndarray, np.ndarray, np.ndarray]:
-    return nearest.t, 0.0, nearest.error, nearest.index, nearest.unsure
+        update(nearest, *_meet(origins, direction, rays.reach, triangle), number + i)
 
 
 def _meet(origins: np.ndarray, direction: np.ndarray, reach: np.ndarray, triangle: np.ndarray) -> Three:
@@ -160,7 +159,7 @@ def _fine_dot(a: TwofoldVector, b: TwofoldVector) -> Twofold:
 
 def _volume(origin: np.ndarray, corners: np.ndarray) -> float:
     """V, rounded once, but never to 0."""
-    whole = exact.volume(vector(origin), corners.tolist())
+    whole = exact.volume(vector(origin), corners.reshape(-1).tolist())
     sign = float((whole > 0) - (whole < 0))
     try:
         return float(whole) or sign * SMALLEST

@@ -25,7 +25,7 @@ from typing import BinaryIO, NamedTuple
 
 import numpy as np
 
-from raytracer import backend, plain
+from raytracer import backend, exact, plain
 from raytracer.scene import Camera, Colour, Light, Materials, Scene, Spheres, Triangles, Vector
 
 LONGEST_LINE = 1 << 16  # bytes; so a file that is one endless line is refused before it fills the memory
@@ -237,9 +237,7 @@ def _end(draft: _Draft) -> None:
     assert draft.vertices is not None
     if len(draft.vertices) < 9:
         raise _Fault("three", found=f"'end' after {_count(len(draft.vertices) // 3, 'vertex', 'vertices')}")
-    first, second, third = _rows(_integers(draft.vertices))
-    edges = ([a - b for a, b in zip(corner, first, strict=True)] for corner in (second, third))
-    if not any(_cross(*edges)):
+    if not exact.has_area(draft.vertices):
         raise _Fault("a triangle with an area", found="three vertices on one line")
     draft.add(draft.triangles, draft.vertices)
     draft.vertices = None

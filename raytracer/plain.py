@@ -127,7 +127,7 @@ def nearest_given(origins: np.ndarray, rays: Rays, balls: np.ndarray, nearest: N
         radius = ball[3]
         lx, ly, lz, c, c_error, size = look(*xyz(origins), *ball)
         h = inner(rays.x, rays.y, rays.z, lx, ly, lz)
-        _update(nearest, *meet(h, rays.square, c, c_error, size, radius, rays.reach), i)
+        update(nearest, *meet(h, rays.square, c, c_error, size, radius, rays.reach), i)
 
 
 def refine_given(
@@ -248,7 +248,7 @@ def xyz(vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return vectors[..., 0], vectors[..., 1], vectors[..., 2]
 
 
-def _update(nearest: Nearest, t: np.ndarray, error: np.ndarray, low: np.ndarray, i: int) -> None:
+def update(nearest: Nearest, t: np.ndarray, error: np.ndarray, low: np.ndarray, i: int) -> None:
     best_t, best_error, best_index, unsure = nearest
     found = nearer(best_t, 0.0, best_error, best_index, unsure, t, 0.0, error, low, i)
     for array, value in zip(nearest, (found[0], *found[2:]), strict=True):

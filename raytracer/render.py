@@ -20,7 +20,7 @@ from raytracer.methods import CERTIFIED
 from raytracer.plan import Plan, make_plan
 from raytracer.pool import share
 from raytracer.scene import Camera, Light, Materials, Scene, Spheres
-from raytracer.screen import SPARE, Pixels, Screen, make_canvas, make_full_paints, make_paints, open_screen
+from raytracer.screen import ALL, SPARE, Pixels, Screen, make_canvas, make_full_paints, make_paints, open_screen
 from raytracer.stages import Block, Whole
 
 _GREY = Materials(np.full((1, 11), 0.5))
@@ -117,14 +117,11 @@ def share_bands(tracer: Eye | Screen, plan: Plan, watch: Watch, work: Callable[[
 
     Work returns the rows of the picture that it has finished.
     """
-    share_pieces(tracer, plan, watch, 1, lambda rows, piece, worker: work(rows, worker))
+    share_pieces(tracer.bands(plan.shading), watch, 1, lambda rows, piece, worker: work(rows, worker))
 
 
-def share_pieces(
-    tracer: Eye | Screen, plan: Plan, watch: Watch, pieces: int, work: Callable[[slice, int, int], slice]
-) -> None:
-    """The same for bands in so many pieces each: work(rows, piece, worker)."""
-    bands = tracer.bands(plan.shading)
+def share_pieces(bands: list[slice], watch: Watch, pieces: int, work: Callable[[slice, int, int], slice]) -> None:
+    """The same for any bands, in so many pieces each: work(rows, piece, worker)."""
     left = {rows.start: pieces for rows in bands}
 
     def one(job: tuple[slice, int], worker: int) -> tuple[int, slice]:
@@ -146,14 +143,15 @@ def share_pieces(
 def _paint(plan: Plan, screen: Screen, picture: np.ndarray, watch: Watch) -> None:
     """A stage that a kernel paints; numpy paints the pixels that float64 was not certain of."""
     easel = make_easel(plan, screen, picture)
-    pieces = -(-_PIECES // len(screen.bands(plan.shading))) if plan.stage.throws_on else 1
+    bands = screen.bands(plan.shading)
+    pieces = -(-_PIECES // len(bands)) if plan.stage.throws_on else 1
 
     def paint(rows: slice, piece: int, worker: int) -> slice:
         tiles = screen.tiles_of(rows)
         easel.paint(rows, worker, (tiles * piece // pieces, tiles * (piece + 1) // pieces))
         return rows
 
-    share_pieces(screen, plan, watch, pieces, paint)
+    share_pieces(bands, watch, pieces, paint)
     easel.finish(*range(len(screen.desks)))
 
 
@@ -166,7 +164,7 @@ class Easel:
     paints: Paints | FullPaints
     picture: np.ndarray  # uint8 (rows, width, 3)
     first_row: int = 0  # of the picture that the rows are of
-    wanted: np.ndarray = field(default_factory=lambda: np.empty((0, 0), np.uint8))  # see `Canvas`
+    wanted: np.ndarray = field(default_factory=lambda: ALL)  # see `Canvas`
 
     def on(self, rows: np.ndarray, first_row: int, wanted: np.ndarray) -> Easel:
         """The same for other rows."""

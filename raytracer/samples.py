@@ -22,9 +22,7 @@ from raytracer.camera import BAND_PIXELS, Raster
 from raytracer.eye import Eye
 from raytracer.image import check_fits_memory
 from raytracer.plan import Plan
-from raytracer.pool import share
 from raytracer.render import (
-    Cancelled,
     Easel,
     Progress,
     Watch,
@@ -33,6 +31,7 @@ from raytracer.render import (
     fitting,
     make_easel,
     open_tracer,
+    share_pieces,
 )
 from raytracer.screen import Screen
 from raytracer.stages import Block, Stage
@@ -95,19 +94,12 @@ def _draw_means(fine: Plan, side: int, wanted: np.ndarray, picture: np.ndarray, 
     with open_tracer(fine, watch.threads) as tracer:
         easel = make_easel(fine, tracer, picture) if fine.painter and isinstance(tracer, Screen) else None
 
-        def one(rows: slice, worker: int) -> slice:
-            if watch.cancelled is not None and watch.cancelled():
-                raise Cancelled
+        def one(rows: slice, piece: int, worker: int) -> slice:
             if wanted[rows].any():
                 _draw_strip(fine, tracer, easel, rows, side, wanted[rows], picture[rows], worker)
             return rows
 
-        def tell(rows: slice) -> None:
-            watch.done += 1
-            if watch.progress is not None:
-                watch.progress(watch.done, len(strips), rows)
-
-        share(strips, one, watch.threads, tell)
+        share_pieces(strips, watch, 1, one)
 
 
 def differing(picture: np.ndarray) -> np.ndarray:

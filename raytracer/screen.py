@@ -288,13 +288,12 @@ def open_screen(scene: Scene, raster: Raster, kernels: ModuleType, threads: int 
         unit, origin, balls, corners = scene_units(scene)
         order, material = scene.numbered
         lens, grid = make_lens(raster), eye_grid(raster)
-        facets = see_facets(grid, usable_spread(raster), origin, corners) if len(corners) else None
-        view = _view(raster, origin, balls, facets, material)
-        if facets is not None:
-            view = view._replace(
-                facets=pack_facets(facets, true_zeros(origin, corners, raster.camera), scene.triangles)
-            )
-        boxes = _facet_boxes(lens, corners - origin, facets)
+        view, boxes = _view(raster, origin, balls, material), _NO_BOXES
+        if len(corners):
+            facets = see_facets(grid, view.kappa, origin, corners)
+            view = _with_facets(view, facets, true_zeros(origin, corners, raster.camera), scene.triangles)
+            boxes = facet_boxes(lens, corners - origin)
+            boxes[~facets.faces] = 0
         bins, slow_ids = _sort(workspace, kernels, lens, view, len(scene.spheres), boxes, threads)
         slow, targets = _slow(lens, view, origin, balls, slow_ids, kernels)
         targets = targets._replace(corners=corners, order=order)
@@ -344,10 +343,10 @@ _NO_BOXES = np.empty((0, 4), np.int32)
 _NONE_SLOW = Slow(np.empty(0, np.int32), _NO_BOXES, Seen(*[_NO_SPHERES] * len(Seen._fields)))
 
 
-_ALL = np.empty((0, 0), np.uint8)
+ALL = np.empty((0, 0), np.uint8)  # of a canvas is wanted
 
 
-def make_canvas(picture: np.ndarray, first_row: int = 0, wanted: np.ndarray = _ALL) -> Canvas | None:
+def make_canvas(picture: np.ndarray, first_row: int = 0, wanted: np.ndarray = ALL) -> Canvas | None:
     """The bytes of a picture (height, width, 3), or of its rows from one on; `wanted` as in `Canvas`.
 
     None if its pixels are not three or four bytes apart.
@@ -377,39 +376,29 @@ def _desk(workspace: Workspace, kernels: ModuleType, worker: int) -> Desk:
     return Desk(scratch, doubts)
 
 
-def _view(raster: Raster, origin: np.ndarray, balls: np.ndarray, facets: Facets | None, material: np.ndarray) -> View:
-    table, first = balls.reshape(-1), len(balls)
-    if facets is not None:
-        table = np.concatenate([balls, facets.planes]).reshape(-1)
-        table.flags.writeable = False  # to the kernels, arrays that can be written to are others
+def _view(raster: Raster, origin: np.ndarray, balls: np.ndarray, material: np.ndarray) -> View:
     grid, (x, y, z) = eye_grid(raster), origin.tolist()
     across = np.concatenate([grid.across, np.full(8, grid.across[-1])])
     up, a1, a0 = (np.append(rows, rows[-1]) for rows in (grid.up, grid.a1, grid.a0))
     return View(
         across, up, a1, a0, grid.a2, grid.u, grid.v, grid.back, grid.reach, usable_spread(raster), (x, y, z),
-        table, material, _NO_SPHERES, first,
+        balls.reshape(-1), material, _NO_SPHERES, len(balls),
     )  # fmt: skip
 
 
-def pack_facets(facets: Facets, zeros: np.ndarray, triangles: Triangles) -> np.ndarray:
-    """What the kernels want to know of triangles, FACET numbers each, flat.
+def _with_facets(view: View, facets: Facets, zeros: np.ndarray, triangles: Triangles) -> View:
+    """The view with triangles as well.
 
-    12 of `Facets.rows`, `distance`, 3 of `true_zeros`, 3 of `Triangles.corner_numbers`, and some to spare.
+    FACET numbers each: 12 of `Facets.rows`, `distance`, 3 of `true_zeros`, 3 of `Triangles.corner_numbers`, and some
+    to spare.
     """
+    table = np.concatenate([view.balls, facets.planes.reshape(-1)])
+    table.flags.writeable = False  # to the kernels, arrays that can be written to are others
     rows = np.zeros((len(facets.rows), FACET))
     rows[:, :12], rows[:, 12], rows[:, 13:16], rows[:, 16:19] = (
         facets.rows, facets.distance, zeros, triangles.corner_numbers,
     )  # fmt: skip
-    return rows.reshape(-1)
-
-
-def _facet_boxes(lens: Lens, corners: np.ndarray, facets: Facets | None) -> np.ndarray:
-    """The boxes of all triangles, those that no ray meets having an empty one."""
-    if facets is None:
-        return _NO_BOXES
-    boxes = facet_boxes(lens, corners)
-    boxes[~facets.faces] = 0
-    return boxes
+    return view._replace(balls=table, facets=rows.reshape(-1))
 
 
 def _sort(

@@ -67,12 +67,6 @@ class Block:
         spheres, facets = (np.searchsorted(table.order, shape) for table in (scene.spheres, scene.triangles))
         return np.where(self._flat, facets, spheres)
 
-    def _of(self, spheres: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-        """The rows of what is hit, in tables of all spheres and of all triangles."""
-        found = np.empty((len(self._number), *spheres.shape[1:]), spheres.dtype)
-        found[~self._flat], found[self._flat] = spheres[self._number[~self._flat]], triangles[self._number[self._flat]]
-        return found
-
     @cached_property
     def _directions(self) -> Vectors:
         grid = eye_grid(self.raster)
@@ -170,11 +164,7 @@ class Block:
     @cached_property
     def diffuse(self) -> np.ndarray:
         """Diffuse colours of what is hit: (hits, 3)."""
-        return self.scene.materials.table[self._material, 0:3]
-
-    @cached_property
-    def _material(self) -> np.ndarray:
-        return self._of(self.scene.spheres.material, self.scene.triangles.material)
+        return self.scene.materials.table[self.scene.numbered[1][self._where], 0:3]
 
     def paint(
         self, colours: np.ndarray | tuple[float, float, float], elsewhere: tuple[float, float, float]
