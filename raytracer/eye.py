@@ -16,7 +16,7 @@ from raytracer.boxes import Lens, facet_boxes, make_lens
 from raytracer.camera import Raster, eye_grid, fine_columns, fine_rows, rows_of, spread, squares, twofold_eye_rays
 from raytracer.certified import LARGEST_SPREAD, fine_direction, refine
 from raytracer.facets import see_facets
-from raytracer.methods import CERTIFIED
+from raytracer.methods import CERTIFIED, Method
 from raytracer.plain import candidates_of, xyz
 from raytracer.scene import Scene
 from raytracer.settle import Bundle, Index, Targets, in_twofold, known_in_integers, polish, settle
@@ -40,7 +40,7 @@ class Eye(NamedTuple):
     seen: Seen  # the spheres
     facets: Facets  # the triangles
     boxes: np.ndarray  # int32 (s + n, 4), see `plain.bound`
-    method: str  # a row of METHODS
+    method: str | Method  # a row of METHODS, by name, or one that is in no table
     balls: Balls | None  # the spheres in view as that method sees them, if it is a usual one
     tests: int  # how many times a ray is tested against a sphere, in float64
 
@@ -146,7 +146,7 @@ def bundle_of(raster: Raster, origin: np.ndarray, xs: np.ndarray, ys: np.ndarray
 
 
 @_NOT_A_NUMBER_IS_NO_ERROR
-def open_eye(scene: Scene, raster: Raster, method: str = CERTIFIED, path: ModuleType | None = None) -> Eye:
+def open_eye(scene: Scene, raster: Raster, method: str | Method = CERTIFIED, path: ModuleType | None = None) -> Eye:
     """Everything about the picture's spheres that does not depend on the pixel; those out of view are left out.
 
     `path` traces; by default it is chosen.

@@ -243,7 +243,10 @@ METHODS = {
 }
 
 
-def check_method(name: str) -> None:
-    """ValueError if there is no such method."""
-    if name not in METHODS:
-        raise ValueError(f"found method {name!r}, expected one of {', '.join(METHODS)}")
+def row_of(method: str | Method) -> Method:
+    """A method by its name, or one that is in no table; ValueError if there is no such method."""
+    if isinstance(method, Method):
+        return method
+    if method not in METHODS:
+        raise ValueError(f"found method {method!r}, expected one of {', '.join(METHODS)}")
+    return METHODS[method]

@@ -44,7 +44,7 @@ from raytracer.certified import (
     refine,
     side_of,
 )
-from raytracer.methods import METHODS, Vector
+from raytracer.methods import Method, Vector, row_of
 from raytracer.twofold import select
 
 
@@ -202,7 +202,7 @@ def candidates_of(boxes: np.ndarray, xs: np.ndarray, ys: np.ndarray) -> Candidat
 
 
 def usual_eye(
-    method: str,
+    method: str | Method,
     origin: Vector,
     rays: UsualRays,
     spheres: Balls,
@@ -212,7 +212,7 @@ def usual_eye(
     index: np.ndarray,
 ) -> None:
     """What rays (rows, width) of one origin meet first by a usual method; boxes and rows as for `first_of_grid`."""
-    function = METHODS[method].function
+    function = row_of(method).function
     assert function is not None
     for i, (left, right, top, bottom) in enumerate(boxes.tolist()):
         box = np.s_[max(top - first_row, 0) : max(min(bottom - first_row, len(t)), 0), left:right]
@@ -224,10 +224,10 @@ def usual_eye(
 
 
 def usual_given(
-    method: str, origins: np.ndarray, rays: UsualRays, spheres: Balls, t: np.ndarray, index: np.ndarray
+    method: str | Method, origins: np.ndarray, rays: UsualRays, spheres: Balls, t: np.ndarray, index: np.ndarray
 ) -> None:
     """What rays (n,) from origins (n, 3) meet first by a usual method."""
-    function = METHODS[method].function
+    function = row_of(method).function
     assert function is not None
     for i in range(len(spheres.radii)):
         found = function(xyz(origins), *rays, xyz(spheres.centres[i]), spheres.radii[i])

@@ -12,7 +12,7 @@ from raytracer.bounce import MOST_REFLECTIONS
 from raytracer.camera import Raster, make_raster
 from raytracer.eye import Eye, open_eye
 from raytracer.full import terms_of
-from raytracer.methods import CERTIFIED, METHODS, check_method
+from raytracer.methods import CERTIFIED, Method, row_of
 from raytracer.scene import Light, Scene
 from raytracer.stages import LIGHT_RANGE, STAGES, Stage
 
@@ -29,7 +29,7 @@ class Plan:
     name: str  # of the stage
     stage: Stage
     raster: Raster
-    method: str
+    method: str | Method
     lights: tuple[Light, ...]
     forced: ModuleType | None = None  # who traces, if it is not to be chosen
     unchecked: bool = False  # paint `diffuse` without certainty, to measure what that costs
@@ -102,22 +102,28 @@ class Plan:
 
 def make_plan(
     scene: Scene,
-    stage: str = "diffuse",
+    stage: str | Stage = "diffuse",
     width: int = 320,
     height: int = 320,
     sampling: str = "corner",
-    method: str = CERTIFIED,
+    method: str | Method = CERTIFIED,
     path: ModuleType | None = None,
 ) -> Plan:
     """The plan for a picture; ValueError for a stage, a size, a sampling or a method that there is not.
 
-    `path` is `raytracer.plain` or `raytracer.kernels`, and chosen by default.
+    Stage and method are those of a table, by name, or rows that are in none. `path` is `raytracer.plain` or
+    `raytracer.kernels`, and chosen by default; a method that is in no table is traced by numpy.
     """
-    if stage not in STAGES:
-        raise ValueError(f"found stage {stage!r}, expected one of {', '.join(STAGES)}")
-    row, raster = STAGES[stage], make_raster(scene.camera, width, height, sampling)
-    check_method(method)
-    return Plan(scene, stage, row, raster, method, _lights_that_matter(scene) if row.needs_lights else (), path)
+    name, row = (stage.about, stage) if isinstance(stage, Stage) else (stage, _stage_named(stage))
+    raster, path = make_raster(scene.camera, width, height, sampling), plain if isinstance(method, Method) else path
+    row_of(method)
+    return Plan(scene, name, row, raster, method, _lights_that_matter(scene) if row.needs_lights else (), path)
+
+
+def _stage_named(name: str) -> Stage:
+    if name not in STAGES:
+        raise ValueError(f"found stage {name!r}, expected one of {', '.join(STAGES)}")
+    return STAGES[name]
 
 
 def _lights_that_matter(scene: Scene) -> tuple[Light, ...]:
@@ -201,7 +207,8 @@ def _reasons_for_tracing(plan: Plan) -> Iterator[str]:
     if plan.method == CERTIFIED:
         yield "every decision certain: float64, where that cannot tell two-fold float64, then integers"
     else:
-        yield f"method {plan.method}: {METHODS[plan.method].about}; what rounding makes of it is what is drawn"
+        name = f"{plan.method}: " if isinstance(plan.method, str) else ""
+        yield f"method {name}{row_of(plan.method).about}; what rounding makes of it is what is drawn"
 
 
 def _warnings(scene: Scene) -> Iterator[str]:

@@ -19,7 +19,7 @@ from raytracer.exact import Root, quotient
 from raytracer.eye import Eye, usable_spread
 from raytracer.facets import see_facets
 from raytracer.image import to_bytes
-from raytracer.methods import CERTIFIED, METHODS
+from raytracer.methods import CERTIFIED, Method, row_of
 from raytracer.path import Hit, LightRay, Ray, rays_of
 from raytracer.plan import Plan, make_plan
 from raytracer.render import block_of, open_tracer, whole_of
@@ -253,7 +253,7 @@ def _watched(eye: Eye, x: int, y: int, sphere: Sphere) -> tuple[dict[str, Any], 
     """What the method's functions hold in their variables when they return, and t."""
     ray = twofold_eye_rays(eye.raster, np.array([x]), np.array([y]))
     seen: dict[str, Any] = {}
-    function = METHODS[eye.method].function or certified.meet
+    function = row_of(eye.method).function or certified.meet
     watched = [each.__code__ for each in (function, methods.from_discriminant, methods.nearest_ahead)]
 
     def watch(frame: FrameType, event: str, result: object) -> None:
@@ -270,9 +270,9 @@ def _watched(eye: Eye, x: int, y: int, sphere: Sphere) -> tuple[dict[str, Any], 
     return seen, float(np.ravel(t)[0])
 
 
-def _one(method: str, origin: Vector, ray: Any, sphere: Sphere) -> Any:
+def _one(method: str | Method, origin: Vector, ray: Any, sphere: Sphere) -> Any:
     """One ray against one sphere, in numpy."""
-    row = METHODS[method]
+    row = row_of(method)
     if row.function is None:
         t, _, low = plain.rough_meeting(np.array([origin]), ray, np.array([*sphere.centre, sphere.radius]))
         return np.where(low < np.inf, np.nan, t)

@@ -11,7 +11,7 @@ from raytracer import backend, exact, plain
 from raytracer.arrays import Candidates, Hits, Nearest, Sides, Tree
 from raytracer.camera import given_rays, twofold_given_rays
 from raytracer.facets import nearest_facets
-from raytracer.methods import CERTIFIED, check_method
+from raytracer.methods import CERTIFIED, Method, row_of
 from raytracer.pool import share
 from raytracer.settle import NO_CORNERS, Bundle, Index, Targets, polish, settle
 from raytracer.units import in_units, unit_directions
@@ -53,7 +53,7 @@ def ray_intersect_scene(
     corners = np.empty((0, 3, 3)) if triangles is None else np.ascontiguousarray(triangles, np.float64)
     _refuse_bad_rays(origins, directions, centres, radii)
     _refuse_bad_triangles(corners)
-    check_method(method)
+    row_of(method)
     path = backend.choose(len(origins) * len(radii), -(-len(origins) // _CHUNK) * len(radii))
     return trace_given(origins, directions, centres, radii, method, path, corners)
 
@@ -64,7 +64,7 @@ def trace_given(
     directions: np.ndarray,
     centres: np.ndarray,
     radii: np.ndarray,
-    method: str,
+    method: str | Method,
     path: ModuleType,
     corners: np.ndarray = NO_CORNERS,
 ) -> Hits:
