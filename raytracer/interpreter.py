@@ -26,6 +26,7 @@ from typing import BinaryIO, NamedTuple
 import numpy as np
 
 from raytracer import backend, exact, plain
+from raytracer.faults import FileError, escaped
 from raytracer.scene import Camera, Colour, Light, Materials, Scene, Spheres, Triangles, Vector
 
 LONGEST_LINE = 1 << 16  # bytes; so a file that is one endless line is refused before it fills the memory
@@ -34,23 +35,12 @@ _MANY_BLOCKS = 160  # after which a file is so large that loading the compiler p
 SMALLEST_FOV = 6.374367059867598e-307  # degrees; below it 1/tan(fov/2) is more than a float64 can hold
 
 
-class SceneError(ValueError):
+class SceneError(FileError):
     """What is wrong with a scene file. `str(error)` is the one line `path:line:column: message`.
 
     Lines and columns count from 1, columns in characters. Where the file could not even be read, `line` and `column`
     are None and the text is `path: message`.
     """
-
-    def __init__(self, path: Path, line: int | None, column: int | None, message: str) -> None:
-        super().__init__(path, line, column, message)
-        self.path = path
-        self.line = line
-        self.column = column
-        self.message = message
-
-    def __str__(self) -> str:
-        place = _printable(str(self.path))
-        return f"{place}: {self.message}" if self.line is None else f"{place}:{self.line}:{self.column}: {self.message}"
 
 
 def interpreter(path: str | os.PathLike[str]) -> Scene:
@@ -311,7 +301,7 @@ def _blocks(file: BinaryIO, path: Path) -> Iterator[bytes]:
 
 def _unreadable(path: Path, error: Exception) -> SceneError:
     reason = getattr(error, "strerror", None) or str(error)
-    return SceneError(path, None, None, f"found no readable file, expected a scene ({_printable(reason)})")
+    return SceneError(path, None, None, f"found no readable file, expected a scene ({escaped(reason)})")
 
 
 def _read_lines(draft: _Draft, block: bytes, number: int, path: Path) -> None:
@@ -514,12 +504,7 @@ def _count(count: int, one: str, many: str) -> str:
 
 
 def _quote(word: str) -> str:
-    return f"'{_printable(word if len(word) <= 40 else word[:39] + '…')}'"
-
-
-def _printable(text: str) -> str:
-    """The text in one line, with escapes in place of characters that cannot be seen."""
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+    return f"'{escaped(word if len(word) <= 40 else word[:39] + '…')}'"
 
 
 # -------------------------------------------------------------------------------------------- writing a scene back

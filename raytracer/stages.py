@@ -43,6 +43,7 @@ class Block:
     whole: Whole | None = None  # the hits of the whole picture, for a stage that looks beyond its rows
     truth: Hits | None = None  # the true hits of these pixels, for a stage that judges the method
     tests: np.ndarray | None = None  # int32, how many spheres each pixel is tested against, for a stage that counts
+    rays: Vectors | None = None  # the pixels' directions, where they are not the raster's own
 
     @cached_property
     def hit(self) -> np.ndarray:
@@ -69,6 +70,8 @@ class Block:
 
     @cached_property
     def _directions(self) -> Vectors:
+        if self.rays is not None:
+            return self.rays
         grid = eye_grid(self.raster)
         if self.columns is None:
             assert isinstance(self.rows, slice)

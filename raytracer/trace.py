@@ -6,6 +6,7 @@ from types import ModuleType
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from raytracer import backend, exact, plain
 from raytracer.arrays import Candidates, Hits, Nearest, Sides, Tree
@@ -25,13 +26,13 @@ _NOT_A_NUMBER_IS_NO_ERROR = np.errstate(all="ignore")
 
 
 def ray_intersect_scene(
-    origins: np.ndarray,
-    directions: np.ndarray,
-    centres: np.ndarray,
-    radii: np.ndarray,
-    method: str = CERTIFIED,
+    origins: ArrayLike,
+    directions: ArrayLike,
+    centres: ArrayLike,
+    radii: ArrayLike,
+    method: str | Method = CERTIFIED,
     *,
-    triangles: np.ndarray | None = None,
+    triangles: ArrayLike | None = None,
 ) -> Hits:
     """What each of n rays hits first of s spheres: `Hits` of shape (n,), `index` counting the spheres given.
 
@@ -55,6 +56,7 @@ def ray_intersect_scene(
     _refuse_bad_triangles(corners)
     row_of(method)
     path = backend.choose(len(origins) * len(radii), -(-len(origins) // _CHUNK) * len(radii))
+    path = plain if isinstance(method, Method) else path
     return trace_given(origins, directions, centres, radii, method, path, corners)
 
 
@@ -136,7 +138,7 @@ class GivenRays(NamedTuple):
         return of_spheres.and_all(spheres, facets) if facets else of_spheres
 
 
-def _vectors(name: str, vectors: np.ndarray) -> np.ndarray:
+def _vectors(name: str, vectors: ArrayLike) -> np.ndarray:
     array = np.ascontiguousarray(vectors, np.float64)
     if array.ndim != 2 or array.shape[1] != 3:
         raise ValueError(f"{name}: found an array of shape {array.shape}, expected (n, 3)")

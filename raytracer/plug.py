@@ -1,0 +1,246 @@
+"""A file of one's own, plugged in: its functions stand in for the tracer's own parts.
+
+`PARTS` says which functions a file may define, and what they are given and return. Running one is running the user's
+own code: see `raytracer.plug_process`, which does that where it can be given up.
+"""
+
+from __future__ import annotations
+
+import sys
+import traceback
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
+from inspect import Parameter, signature
+from pathlib import Path
+from types import FunctionType, ModuleType, TracebackType
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from raytracer.course import WrongResultError, draw_one_by_one
+from raytracer.faults import FileError
+from raytracer.image import to_bytes
+from raytracer.methods import CERTIFIED, Limits, Method
+from raytracer.plan import Plan, make_plan
+from raytracer.render import draw
+from raytracer.scene import Scene
+from raytracer.stages import STAGES, Block, Stage
+
+_ONE_BY_ONE = ("eye_ray", "intersect", "intersect_triangle", "shade")
+
+Tell = Callable[[np.ndarray], object]
+
+
+class PlugError(FileError):
+    """What is wrong with a plugged file, or went wrong in it: `path:line:column: message`."""
+
+
+class Part(NamedTuple):
+    """One row of PARTS."""
+
+    takes: tuple[str, ...]
+    returns: str
+
+
+PARTS = {
+    "render_scene": Part(("scene", "width", "height"), "the picture: rows of pixels of three numbers, 0 to 1"),
+    "eye_ray": Part(("camera", "x", "y", "width", "height"), "the direction of a pixel's ray: three numbers"),
+    "intersect": Part(("ray", "sphere"), "t of the hit, None for a miss"),
+    "intersect_triangle": Part(("ray", "triangle"), "t of the hit, None for a miss"),
+    "shade": Part(("hit",), "the colour of a hit: three numbers, 0 to 1"),
+    "method": Part(("origin", "direction", "centre", "r"), "t of the hits, +inf for a miss: an array"),
+    "stage": Part(("block",), "the colours of a block of pixels: an array, 0 to 1"),
+}
+
+
+@dataclass(frozen=True)
+class Plug:
+    """What a file defines."""
+
+    path: Path
+    functions: dict[str, Callable[..., Any]]  # by their names in PARTS
+    stage: str  # that its `shade`, `stage` or `render_scene` draws; those that find hits serve all stages
+
+    def draws(self, stage: str) -> bool:
+        """Whether it has a part in the picture of this stage."""
+        return stage == self.stage or bool(self.functions.keys() - {"shade", "stage", "render_scene"})
+
+
+@dataclass(frozen=True)
+class Order:
+    """A picture that is wanted of a plugged file."""
+
+    scene: Scene
+    stage: str = "diffuse"
+    width: int = 320
+    height: int = 320
+    sampling: str = "corner"
+    method: str = CERTIFIED  # of the hits that the file does not find itself
+
+
+def load_plug(path: Path) -> Plug:
+    """Run a file, and find the functions in it that can be plugged in. Raises `PlugError`."""
+    try:
+        source = path.read_bytes()
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        raise PlugError(path, None, None, f"found no readable file, expected Python ({reason})") from error
+    module = ModuleType(f"plugged_{path.stem}")
+    module.__file__ = str(path)
+    sys.modules[module.__name__] = module  # where dataclasses look for their module
+    sys.path.insert(0, str(path.resolve().parent))
+    with blaming(path, "while it is loaded"):
+        exec(compile(source, str(path), "exec"), vars(module))
+    return _plug_of(path, vars(module))
+
+
+def _plug_of(path: Path, names: dict[str, Any]) -> Plug:
+    functions = {name: names[name] for name in PARTS if callable(names.get(name))}
+    if not functions:
+        own = [
+            name for name, value in names.items() if isinstance(value, FunctionType) and value.__module__ != __name__
+        ]
+        near = [(name, *get_close_matches(name, PARTS, n=1)) for name in own]
+        hints = [f"; did you mean {pair[1]} by {pair[0]}?" for pair in near if len(pair) == 2]
+        raise PlugError(
+            path, None, None,
+            f"found {_listed(own) or 'no function'}, expected one or more of {', '.join(PARTS)}{''.join(hints[:1])}",
+        )  # fmt: skip
+    for name, function in functions.items():
+        _check_takes(path, name, function)
+    stage = names.get("STAGE", "diffuse")
+    if stage not in STAGES:
+        raise PlugError(path, None, None, f"found STAGE = {stage!r}, expected one of {', '.join(STAGES)}")
+    return Plug(path, functions, stage)
+
+
+def _listed(names: list[str]) -> str:
+    return f"only {', '.join(names[:5])}{', …' if len(names) > 5 else ''}" if names else ""
+
+
+def _check_takes(path: Path, name: str, function: Callable[..., Any]) -> None:
+    """PlugError where a function cannot be called as it will be."""
+    wanted = PARTS[name].takes
+    try:
+        signature(function).bind(*wanted)
+    except TypeError:
+        given = ", ".join(key for key, p in signature(function).parameters.items() if p.kind != Parameter.KEYWORD_ONLY)
+        line = getattr(getattr(function, "__code__", None), "co_firstlineno", None)
+        message = f"found {name}({given}), expected {name}({', '.join(wanted)})"
+        raise PlugError(path, line, None, message) from None
+    except ValueError:  # something built in, of which nothing is known
+        pass
+
+
+def draw_plugged(plug: Plug, order: Order, tell: Tell = lambda picture: None) -> np.ndarray:
+    """The picture with the file's functions in place of the tracer's: uint8 (height, width, 3). Raises `PlugError`.
+
+    `tell(picture)` is called now and then with the picture as far as it has come, where that can be known.
+    """
+    functions, ours = plug.functions, order.stage == plug.stage
+    with blaming(plug.path, f"drawing {order.stage}"):
+        if ours and "render_scene" in functions:
+            return _whole(functions["render_scene"], order)
+        plan = plan_of(plug, order)
+        if any(name in functions for name in _ONE_BY_ONE) and plan.stage.needs_hits:
+            return draw_one_by_one(functions, plan, ours and "shade" in functions, tell)
+        return draw(plan)
+
+
+def plan_of(plug: Plug, order: Order) -> Plan:
+    """The plan of a picture, with the file's stage and method if it has them."""
+    functions, stage, method = plug.functions, STAGES[order.stage], method_of(plug) or order.method
+    if order.stage == plug.stage and "stage" in functions:
+        stage = _stage_of(functions["stage"], stage)
+    return make_plan(order.scene, stage, order.width, order.height, order.sampling, method)
+
+
+def method_of(plug: Plug) -> Method | None:
+    """The file's method, if it has one: numpy, in float64."""
+    function = plug.functions.get("method")
+    if function is None:
+        return None
+
+    def checked(*given: Any) -> Any:
+        found, expected = function(*given), np.shape(given[1][0])
+        try:
+            t = np.broadcast_to(np.asarray(found, float), expected)
+        except (TypeError, ValueError):
+            raise WrongResultError(function, found, f"t, an array {expected}") from None
+        return np.where(np.isnan(t), np.inf, t)
+
+    return Method(checked, f"method of {plug.path.name}", str(plug.path), Limits())
+
+
+def _stage_of(function: Callable[..., Any], ours: Stage) -> Stage:
+    """The file's stage, in place of one of ours."""
+
+    def checked(block: Block) -> np.ndarray:
+        found, expected = function(block), (*block.hits.index.shape, 3)
+        try:
+            return np.broadcast_to(np.asarray(found, float), expected)
+        except (TypeError, ValueError):
+            raise WrongResultError(function, found, f"colours, an array {expected}") from None
+
+    return replace(ours, colours=checked, painter="", needs_hits=True, needs_lights=True)
+
+
+def _whole(function: Callable[..., Any], order: Order) -> np.ndarray:
+    """A picture that the file draws all by itself."""
+    found, expected = function(order.scene, order.width, order.height), (order.height, order.width, 3)
+    try:
+        picture = np.asarray(found)
+        numbers = picture if picture.dtype == np.uint8 else picture.astype(float)
+    except (TypeError, ValueError):
+        raise WrongResultError(function, found, f"a picture {expected}") from None
+    if numbers.shape != expected:
+        raise WrongResultError(function, numbers, f"{expected}: rows, columns, colours")
+    return numbers if numbers.dtype == np.uint8 else to_bytes(numbers)
+
+
+# ------------------------------------------------------------------------------------------- whose mistake it was
+
+
+@contextmanager
+def blaming(path: Path, when: str) -> Iterator[None]:
+    """Turn whatever goes wrong in a user's file into a `PlugError` that says where."""
+    try:
+        yield
+    except PlugError:
+        raise
+    except WrongResultError as error:
+        line = getattr(getattr(error.function, "__code__", None), "co_firstlineno", None)
+        raise PlugError(path, line, None, str(error)) from error
+    except SyntaxError as error:
+        where = Path(error.filename) if error.filename else path
+        raise PlugError(where, error.lineno, error.offset, f"{type(error).__name__}: {error.msg}") from error
+    except (Exception, SystemExit) as error:
+        raise _fault_of(error, path, when) from error
+
+
+def _fault_of(error: BaseException, path: Path, when: str) -> PlugError:
+    """Where in the user's files the error was raised, or what of them led to it."""
+    text = " ".join(str(error).split())
+    message = f"{type(error).__name__}{': ' if text else ''}{text}, {when}"
+    file, line, column = _last_place(error.__traceback__, path.resolve().parent) or (path, None, None)
+    return PlugError(file, line, column, message)
+
+
+def _last_place(trace: TracebackType | None, folder: Path) -> tuple[Path, int | None, int | None] | None:
+    """The innermost place in a file of this folder, packages that are installed in it left out."""
+    places = [frame for frame in traceback.extract_tb(trace) if _is_own(frame.filename, folder)]
+    if not places:
+        return None
+    last = places[-1]
+    return Path(last.filename), last.lineno, None if last.colno is None else last.colno + 1
+
+
+def _is_own(filename: str, folder: Path) -> bool:
+    path = Path(filename)
+    return folder in path.resolve().parents and "site-packages" not in path.parts and not _is_ours(path)
+
+
+def _is_ours(path: Path) -> bool:
+    return Path(__file__).resolve().parent in path.resolve().parents

@@ -1,0 +1,247 @@
+"""A plugged file runs in a process of its own: one that hangs is given up, and what it prints or eats stays there.
+
+    here ── order ──> child: loads the file, draws ── print, picture, … , done or fault ──> here
+
+A process draws one picture, so that each begins with the file as it is saved then; the next one is started ahead and
+has everything but the file loaded.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import pickle
+import queue
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+
+from raytracer.plug import Order, PlugError, draw_plugged, load_plug
+from raytracer.render import Cancelled
+
+PATIENCE = 60.0  # seconds without a sign of life after which a picture is given up
+MEMORY = 4 << 30  # bytes that a plugged file may take, unless less are free
+MOST_LINES, LONGEST_LINE = 1000, 2000  # that are printed of each picture, and characters of each
+_LOOK = 0.02  # seconds between two questions whether the picture is still wanted
+_OFTEN = 0.05  # seconds from one message about the picture to the next
+
+Tell = Callable[[np.ndarray], object]
+Say = Callable[[str], object]
+
+
+@dataclass
+class PlugRunner:
+    """Runs a plugged file, one process a task. `say` is given what the file prints, line by line."""
+
+    path: Path
+    patience: float = PATIENCE
+    say: Say = lambda line: None
+    ahead: bool = False  # whether the next process is started before it is needed
+    _spare: _Child | None = field(default=None, init=False)
+    _busy: _Child | None = field(default=None, init=False)
+    _closed: bool = field(default=False, init=False)
+
+    def __post_init__(self) -> None:
+        if self.ahead:
+            self._spare = _Child()
+
+    def draw(
+        self, order: Order, tell: Tell = lambda picture: None, cancelled: Callable[[], bool] = lambda: False
+    ) -> np.ndarray:
+        """The picture: uint8 (height, width, 3). Raises `PlugError`, and `Cancelled` when that is said."""
+        picture: np.ndarray = self.run("draw", (self.path, order), tell, cancelled)
+        return picture
+
+    def run(self, task: str, given: Any, tell: Tell, cancelled: Callable[[], bool]) -> Any:
+        """Have a task of `_TASKS` done by a process of its own."""
+        child, self._spare = self._spare or _Child(), None
+        self._busy = child
+        try:
+            child.begin(task, given)
+            if self.ahead and not self._closed:
+                self._spare = _Child()
+            return self._follow(child, tell, cancelled)
+        finally:
+            child.kill()
+            self._busy = None
+
+    def close(self) -> None:
+        """End all processes."""
+        self._closed = True
+        for child in (self._spare, self._busy):
+            if child is not None:
+                child.kill()
+
+    def _follow(self, child: _Child, tell: Tell, cancelled: Callable[[], bool]) -> Any:
+        heard = time.monotonic()
+        while True:
+            if cancelled() or self._closed:
+                raise Cancelled
+            try:
+                kind, content = child.messages.get(timeout=_LOOK)
+            except queue.Empty:
+                if time.monotonic() - heard > self.patience:
+                    message = f"no sign of life for {self.patience:g} seconds: given up (does it loop for ever?)"
+                    raise PlugError(self.path, None, None, message) from None
+                continue
+            if kind == "print":  # which is no sign of life: a loop may print for ever
+                self.say(content)
+                continue
+            heard = time.monotonic()
+            if kind == "picture":
+                tell(content)
+            elif kind == "done":
+                return content
+            elif kind == "fault":
+                raise PlugError(*content)
+            elif not self._closed:
+                raise PlugError(self.path, None, None, f"ended before it was done: {child.epitaph()}")
+
+
+class _Child:
+    """A process that does one task, as seen from here. Its messages end with ("end", None)."""
+
+    def __init__(self) -> None:
+        here = str(Path(__file__).resolve().parent.parent)
+        self._process = subprocess.Popen(
+            [sys.executable, "-P", "-m", "raytracer.plug_process"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, [here, os.environ.get("PYTHONPATH")]))},
+            start_new_session=True,  # Ctrl-C is for us; when we have ended, the child ends by itself
+        )
+        self.messages: queue.Queue[tuple[str, Any]] = queue.Queue(64)
+        self._dead = threading.Event()
+        threading.Thread(target=self._listen, name="plug listener", daemon=True).start()
+
+    def begin(self, task: str, given: Any) -> None:
+        assert self._process.stdin is not None
+        with suppress(OSError):  # it is dead already, and `messages` say so
+            pickle.dump((task, given), self._process.stdin)
+            self._process.stdin.flush()  # and stays open: when this process ends, the child sees it
+
+    def kill(self) -> None:
+        self._dead.set()
+        self._process.kill()
+        self._process.wait()
+        for pipe in (self._process.stdin, self._process.stdout):
+            if pipe is not None:
+                with suppress(OSError):  # what was not written any more
+                    pipe.close()
+
+    def epitaph(self) -> str:
+        """How it ended."""
+        status = self._process.wait()
+        return f"killed by {signal.Signals(-status).name}" if status < 0 else f"exit status {status}"
+
+    def _listen(self) -> None:
+        message: tuple[str, Any] = ("", None)
+        while message[0] != "end":
+            try:
+                message = pickle.load(self._process.stdout)  # type: ignore[arg-type]
+            except (EOFError, OSError, ValueError, pickle.UnpicklingError):
+                message = ("end", None)
+            while not self._dead.is_set():
+                with suppress(queue.Full):
+                    self.messages.put(message, timeout=1)
+                    break
+
+
+# ---------------------------------------------------------------------------------------------- within the process
+
+
+def serve() -> None:
+    """Do one task and end."""
+    channel, orders = os.fdopen(os.dup(1), "wb"), sys.stdin.buffer
+    os.dup2(2, 1)  # what a library prints goes where errors go
+    task, given = pickle.load(orders)
+    threading.Thread(target=_end_with, args=(orders,), daemon=True).start()
+    send = _Sender(channel)
+    sys.stdout, sys.stdin = _Printer(send), Path(os.devnull).open()  # noqa: SIM115 (as long as the process)
+    _limit_memory()
+    try:
+        send("done", _TASKS[task](given, send))
+    except PlugError as error:
+        send("fault", (error.path, error.line, error.column, error.message))
+    channel.flush()
+    os._exit(0)  # whatever threads the file has started
+
+
+def _draw(given: tuple[Path, Order], send: _Sender) -> np.ndarray:
+    path, order = given
+    return draw_plugged(load_plug(path), order, send.picture)
+
+
+_TASKS: dict[str, Callable[[Any, _Sender], Any]] = {"draw": _draw}
+
+
+class _Sender:
+    """Writes messages, from one thread at a time."""
+
+    def __init__(self, channel: IO[bytes]) -> None:
+        self._channel, self._turn, self._last = channel, threading.Lock(), 0.0
+
+    def __call__(self, kind: str, content: Any) -> None:
+        with self._turn:
+            pickle.dump((kind, content), self._channel, pickle.HIGHEST_PROTOCOL)
+            self._channel.flush()
+
+    def picture(self, picture: np.ndarray) -> None:
+        """Send a picture as far as it has come, unless one was sent a moment ago."""
+        now = time.monotonic()
+        if now - self._last > _OFTEN:
+            self._last = now
+            self("picture", picture)
+
+
+class _Printer(io.TextIOBase):
+    """What the file prints, line by line, and no more of it than anybody reads."""
+
+    def __init__(self, send: _Sender) -> None:
+        self._send, self._line, self._lines = send, "", 0
+
+    def writable(self) -> bool:
+        return True
+
+    def write(self, text: str) -> int:
+        *lines, self._line = (self._line + text).split("\n")
+        for line in lines:
+            self._lines += 1
+            if self._lines <= MOST_LINES:
+                self._send("print", line[:LONGEST_LINE])
+            elif self._lines == MOST_LINES + 1:
+                self._send("print", f"… more than {MOST_LINES} lines: the rest is left out")
+        self._line = self._line[:LONGEST_LINE]
+        return len(text)
+
+
+def _end_with(orders: IO[bytes]) -> None:
+    """End this process when the one that has started it does."""
+    orders.read()
+    os._exit(0)
+
+
+def _limit_memory() -> None:
+    """Let the file run out of memory before the machine does."""
+    try:
+        import resource  # which Windows has not
+    except ImportError:
+        return
+    import psutil
+
+    room = min(MEMORY, int(psutil.virtual_memory().available * 0.8))
+    limit = psutil.Process().memory_info().vms + room
+    resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+
+
+if __name__ == "__main__":
+    serve()
