@@ -266,7 +266,7 @@ def error(block: Block) -> np.ndarray:
     hit, truly_hit = found.index >= 0, true.index >= 0
     with np.errstate(all="ignore"):
         ulps = np.abs(found.t - true.t) / np.spacing(true.t)
-    picture = _on_scale(np.where(hit & truly_hit & np.isfinite(ulps), ulps, 0.0), ULPS)
+    picture = on_scale(np.where(hit & truly_hit & np.isfinite(ulps), ulps, 0.0), ULPS)
     picture[~hit & ~truly_hit] = NOTHING
     picture[hit & truly_hit & (found.index != true.index)] = WRONG_SHAPE
     picture[hit & ~truly_hit] = FALSE_HIT
@@ -277,10 +277,10 @@ def error(block: Block) -> np.ndarray:
 def cost(block: Block) -> np.ndarray:
     """How many shapes each pixel is tested against: those in whose boxes it lies."""
     assert block.tests is not None
-    return _on_scale(block.tests, TESTS)
+    return on_scale(block.tests, TESTS)
 
 
-def _on_scale(values: np.ndarray, scale: Scale) -> np.ndarray:
+def on_scale(values: np.ndarray, scale: Scale) -> np.ndarray:
     """Colours for numbers, logarithmic between those of the scale."""
     logarithms, stops = (np.log2(np.maximum(x, 0.5)) for x in (values, [stop for stop, _ in scale]))
     return np.stack([np.interp(logarithms, stops, [colour[k] for _, colour in scale]) for k in range(3)], axis=-1)
