@@ -74,23 +74,27 @@ class Hit:
         return self.nearest(Ray(origin, direction))
 
 
-def draw_one_by_one(functions: Functions, plan: Plan, shaded: bool, tell: Callable[[np.ndarray], object]) -> np.ndarray:
+def draw_one_by_one(
+    functions: Functions, plan: Plan, shaded: bool, tell: Callable[[np.ndarray, float], object]
+) -> np.ndarray:
     """The picture of a plan with these functions in place of the tracer's: uint8 (height, width, 3).
 
-    Colours are those of `shade` where `shaded`, of the plan's stage otherwise. `tell(picture)` is called now and then
-    with the picture as far as it has come. Raises `WrongResultError`, and whatever the functions raise.
+    Colours are those of `shade` where `shaded`, of the plan's stage otherwise. `tell(picture, done)` is called now and
+    then with the picture as far as it has come, and the part of its pixels that are drawn. Raises `WrongResultError`,
+    and whatever the functions raise.
     """
     height, width = plan.raster.height, plan.raster.width
     picture, loop = np.full((height, width, 3), BLANK, np.uint8), _Loop(functions, plan, shaded)
     hits = Hits(np.full((height, width), inf), np.full((height, width), -1, np.int32))
-    at_once = shaded or not plan.stage.needs_whole
+    drawn, at_once = 0, shaded or not plan.stage.needs_whole
     for stride, ys, xs in chunks(height, width):
         block = loop.block(ys, xs)
         hits.t[ys, xs], hits.index[ys, xs] = block.hits
         if at_once:
             for y, x, colour in zip(ys.tolist(), xs.tolist(), loop.colours(block), strict=True):
                 picture[y : y + stride, x : x + stride] = colour
-        tell(picture)
+        drawn += len(ys)
+        tell(picture, drawn / (height * width))
     if not at_once:
         picture[...] = colours_of(
             plan, Block(plan.scene, plan.raster, slice(0, height), hits, plan.lights, whole=Whole(hits))

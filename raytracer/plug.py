@@ -28,9 +28,10 @@ from raytracer.render import draw
 from raytracer.scene import Scene
 from raytracer.stages import STAGES, Block, Stage
 
+_OF_ONE_STAGE = ("render_scene", "shade", "stage")
 _ONE_BY_ONE = ("eye_ray", "intersect", "intersect_triangle", "shade")
 
-Tell = Callable[[np.ndarray], object]
+Tell = Callable[[np.ndarray, float], object]
 
 
 class PlugError(FileError):
@@ -63,9 +64,11 @@ class Plug:
     functions: dict[str, Callable[..., Any]]  # by their names in PARTS
     stage: str  # that its `shade`, `stage` or `render_scene` draws; those that find hits serve all stages
 
-    def draws(self, stage: str) -> bool:
-        """Whether it has a part in the picture of this stage."""
-        return stage == self.stage or bool(self.functions.keys() - {"shade", "stage", "render_scene"})
+    def parts_of(self, stage: str) -> tuple[str, ...]:
+        """Which of the functions have a part in the picture of this stage."""
+        if stage == self.stage:
+            return ("render_scene",) if "render_scene" in self.functions else tuple(self.functions)
+        return tuple(name for name in self.functions if name not in _OF_ONE_STAGE) if STAGES[stage].needs_hits else ()
 
 
 @dataclass(frozen=True)
@@ -134,17 +137,17 @@ def _check_takes(path: Path, name: str, function: Callable[..., Any]) -> None:
         pass
 
 
-def draw_plugged(plug: Plug, order: Order, tell: Tell = lambda picture: None) -> np.ndarray:
+def draw_plugged(plug: Plug, order: Order, tell: Tell = lambda picture, done: None) -> np.ndarray:
     """The picture with the file's functions in place of the tracer's: uint8 (height, width, 3). Raises `PlugError`.
 
-    `tell(picture)` is called now and then with the picture as far as it has come, where that can be known.
+    `tell(picture, done)` is called now and then with the picture as far as it has come, where that can be known.
     """
     functions, ours = plug.functions, order.stage == plug.stage
     with blaming(plug.path, f"drawing {order.stage}"):
         if ours and "render_scene" in functions:
             return _whole(functions["render_scene"], order)
         plan = plan_of(plug, order)
-        if any(name in functions for name in _ONE_BY_ONE) and plan.stage.needs_hits:
+        if any(name in functions for name in _ONE_BY_ONE):
             return draw_one_by_one(functions, plan, ours and "shade" in functions, tell)
         return draw(plan)
 

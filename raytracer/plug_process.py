@@ -8,6 +8,7 @@ has everything but the file loaded.
 
 from __future__ import annotations
 
+import argparse
 import io
 import os
 import pickle
@@ -25,7 +26,7 @@ from typing import IO, Any
 
 import numpy as np
 
-from raytracer.plug import Order, PlugError, draw_plugged, load_plug
+from raytracer.plug import Order, Plug, PlugError, draw_plugged, load_plug
 from raytracer.render import Cancelled
 
 PATIENCE = 60.0  # seconds without a sign of life after which a picture is given up
@@ -34,8 +35,27 @@ MOST_LINES, LONGEST_LINE = 1000, 2000  # that are printed of each picture, and c
 _LOOK = 0.02  # seconds between two questions whether the picture is still wanted
 _OFTEN = 0.05  # seconds from one message about the picture to the next
 
-Tell = Callable[[np.ndarray], object]
+Tell = Callable[[np.ndarray, float], object]
+Names = tuple[str, ...]
 Say = Callable[[str], object]
+
+
+def plugged_file(text: str) -> Path:
+    """The file that an argument names. Raises `argparse.ArgumentTypeError` if there is none."""
+    path = Path(text)
+    if not path.is_file():
+        raise argparse.ArgumentTypeError(f"found {text!r}, which is no file, expected one in Python")
+    return path
+
+
+def seconds(text: str) -> float:
+    """The time that an argument names. Raises `argparse.ArgumentTypeError` if it is none."""
+    try:
+        if (patience := float(text)) > 0:
+            return patience
+    except ValueError:
+        pass
+    raise argparse.ArgumentTypeError(f"found {text!r}, expected seconds, more than 0")
 
 
 @dataclass
@@ -55,18 +75,21 @@ class PlugRunner:
             self._spare = _Child()
 
     def draw(
-        self, order: Order, tell: Tell = lambda picture: None, cancelled: Callable[[], bool] = lambda: False
-    ) -> np.ndarray:
-        """The picture: uint8 (height, width, 3). Raises `PlugError`, and `Cancelled` when that is said."""
-        picture: np.ndarray = self.run("draw", (self.path, order), tell, cancelled)
-        return picture
+        self, order: Order, tell: Tell = lambda picture, done: None, cancelled: Callable[[], bool] = lambda: False
+    ) -> tuple[np.ndarray | None, Names]:
+        """The picture, uint8 (height, width, 3), and which functions of the file had a part in it.
+
+        None if none of them had. Raises `PlugError`, and `Cancelled` when that is said.
+        """
+        found: tuple[np.ndarray | None, Names] = self.run("draw", order, tell, cancelled)
+        return found
 
     def run(self, task: str, given: Any, tell: Tell, cancelled: Callable[[], bool]) -> Any:
         """Have a task of `_TASKS` done by a process of its own."""
         child, self._spare = self._spare or _Child(), None
         self._busy = child
         try:
-            child.begin(task, given)
+            child.begin(task, (self.path, given))
             if self.ahead and not self._closed:
                 self._spare = _Child()
             return self._follow(child, tell, cancelled)
@@ -98,7 +121,7 @@ class PlugRunner:
                 continue
             heard = time.monotonic()
             if kind == "picture":
-                tell(content)
+                tell(*content)
             elif kind == "done":
                 return content
             elif kind == "fault":
@@ -163,25 +186,25 @@ def serve() -> None:
     """Do one task and end."""
     channel, orders = os.fdopen(os.dup(1), "wb"), sys.stdin.buffer
     os.dup2(2, 1)  # what a library prints goes where errors go
-    task, given = pickle.load(orders)
+    task, (path, given) = pickle.load(orders)
     threading.Thread(target=_end_with, args=(orders,), daemon=True).start()
     send = _Sender(channel)
     sys.stdout, sys.stdin = _Printer(send), Path(os.devnull).open()  # noqa: SIM115 (as long as the process)
     _limit_memory()
     try:
-        send("done", _TASKS[task](given, send))
+        send("done", _TASKS[task](load_plug(path), given, send))
     except PlugError as error:
         send("fault", (error.path, error.line, error.column, error.message))
     channel.flush()
     os._exit(0)  # whatever threads the file has started
 
 
-def _draw(given: tuple[Path, Order], send: _Sender) -> np.ndarray:
-    path, order = given
-    return draw_plugged(load_plug(path), order, send.picture)
+def _draw(plug: Plug, order: Order, send: _Sender) -> tuple[np.ndarray | None, Names]:
+    names = plug.parts_of(order.stage)
+    return draw_plugged(plug, order, send.picture) if names else None, names
 
 
-_TASKS: dict[str, Callable[[Any, _Sender], Any]] = {"draw": _draw}
+_TASKS: dict[str, Callable[[Plug, Any, _Sender], Any]] = {"draw": _draw}
 
 
 class _Sender:
@@ -195,12 +218,12 @@ class _Sender:
             pickle.dump((kind, content), self._channel, pickle.HIGHEST_PROTOCOL)
             self._channel.flush()
 
-    def picture(self, picture: np.ndarray) -> None:
+    def picture(self, picture: np.ndarray, done: float) -> None:
         """Send a picture as far as it has come, unless one was sent a moment ago."""
         now = time.monotonic()
         if now - self._last > _OFTEN:
             self._last = now
-            self("picture", picture)
+            self("picture", (picture, done))
 
 
 class _Printer(io.TextIOBase):

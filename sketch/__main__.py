@@ -11,6 +11,7 @@ from pathlib import Path
 
 from raytracer import METHODS, STAGES, save_png
 from raytracer.methods import CERTIFIED
+from raytracer.plug_process import PATIENCE, plugged_file, seconds
 from sketch import display, java
 from sketch.controls import View, keys_as_markdown
 from sketch.files import save_beside
@@ -42,7 +43,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except NoScenesError as error:
         print(error, file=sys.stderr)
         return 1
-    return open_window(View(scenes, place, options.stage, options.method), options.size or SIZE)
+    view = View(scenes, place, options.stage, options.method, plug=options.plug)
+    return open_window(view, options.size or SIZE, options.patience)
 
 
 def why_no_window() -> str:
@@ -56,9 +58,9 @@ def why_no_window() -> str:
     return "" if chosen.found else chosen.why
 
 
-def open_window(view: View, size: int) -> int:
+def open_window(view: View, size: int, patience: float) -> int:
     """Open the window; its first picture is drawn while Java starts. Returns only if there is none."""
-    session = Session(view, size)
+    session = Session(view, size, patience)
     try:
         from sketch.window import run_window
     except (ImportError, RuntimeError) as error:  # py5 says RuntimeError when Java does not start
@@ -113,6 +115,14 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--size", metavar="N", type=_size, help=f"draw N × N pixels (default: {SIZE})")
     parser.add_argument("--stage", choices=STAGES, default="diffuse", help="the stage to begin with, or of the gallery")
     parser.add_argument("--method", choices=METHODS, default=CERTIFIED, help="the method to begin with")
+    parser.add_argument(
+        "--plug", metavar="FILE.py", type=plugged_file,
+        help="a file of your own whose functions stand in for the tracer's; python -m raytracer template shows some",
+    )  # fmt: skip
+    parser.add_argument(
+        "--patience", metavar="SECONDS", type=seconds, default=PATIENCE,
+        help=f"how long it may show no sign of life before a picture is given up (default: {PATIENCE:g})",
+    )  # fmt: skip
     parser.add_argument("--sheet", metavar="OUT.png", type=Path, help="draw every scene at every stage into one PNG")
     parser.add_argument("--gallery", metavar="OUT.png", type=Path, help="draw every scene at that stage into one PNG")
     parser.add_argument("--versions", action="store_true", help="print which Java is used, and why, and all versions")

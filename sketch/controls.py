@@ -19,6 +19,13 @@ MOUSE = (
     ("dragging", "turns the camera about the scene"),
     ("the wheel", "moves the camera, nearer or farther away"),
 )
+OWN, REFERENCE, DIFFERENCE, WIPE = "own", "reference", "difference", "wipe"
+LENSES = {  # what is shown of a picture and of what it ought to be
+    OWN: "your own picture",
+    REFERENCE: "the reference",
+    DIFFERENCE: "their difference",
+    WIPE: "your own left of the mouse, the reference right of it",
+}
 SLACK = 3  # pixels: a hand that trembles does not drag
 
 Place = tuple[int, int]  # column and row
@@ -42,7 +49,11 @@ class View:
     stage: str = "diffuse"
     method: str = CERTIFIED
     samples: Samples = 1  # rays a pixel, where the stage takes more than one
-    readings: int = 0  # how often the user has asked for the files to be read again
+    plug: Path | None = None  # a file of the user's own that is plugged in
+    lens: str = OWN  # of LENSES
+    border: int | None = None  # between the two pictures, a column, where the mouse has been
+    readings: int = 0  # how often the scene's file is read again, for a key or because it was saved
+    plug_readings: int = 0  # the same for the plugged file
     orbit: Orbit = HOME  # where the scene is seen from
     grip: Grip | None = None  # while a button is held down
     pixel: Place | None = None  # whose story is told
@@ -58,6 +69,11 @@ class View:
     @property
     def scene(self) -> Path:
         return self.scenes[self.place]
+
+    @property
+    def has_own(self) -> bool:
+        """Whether the picture is another one than the reference, or may be."""
+        return self.plug is not None or self.method != CERTIFIED
 
 
 class Key(NamedTuple):
@@ -104,6 +120,15 @@ def to_next_samples(view: View, key: str) -> View:
     return replace(view, samples=after, note=note)
 
 
+def to_next_lens(view: View, key: str) -> View:
+    """The user's own picture, the reference, their difference, and the two side by side."""
+    if not view.has_own:
+        return replace(view, lens=OWN, note="this is the reference: plug in a file, or take another method with m")
+    names = list(LENSES)
+    lens = names[(names.index(view.lens) + 1) % len(names)]
+    return replace(view, lens=lens, note=f"{lens}: {LENSES[lens]}")
+
+
 def to_file_view(view: View, key: str) -> View:
     note = "this is the file's own view" if view.orbit == HOME else ""
     return _at_home(replace(view, note=note))
@@ -116,7 +141,16 @@ def show_legend(view: View, key: str) -> View:
 
 
 def read_again(view: View, key: str) -> View:
-    return replace(view, readings=view.readings + 1)
+    return replace(view, readings=view.readings + 1, plug_readings=view.plug_readings + 1)
+
+
+def saved(view: View, path: Path) -> View:
+    """The view when a file has been saved, replaced or removed by somebody."""
+    if path == view.scene:
+        view = replace(view, readings=view.readings + 1)
+    if path == view.plug:
+        view = replace(view, plug_readings=view.plug_readings + 1)
+    return replace(view, wish="")
 
 
 def save(view: View, key: str) -> View:
@@ -138,9 +172,15 @@ KEYS = (
     Key("\t", "Tab", "the next stage", to_next_stage),
     Key("mM", "m", "the next method; M the one before", to_next_method),
     Key("a", "a", "anti-aliasing: 1, 4 or 16 samples a pixel, or more only where neighbours differ", to_next_samples),
+    Key(
+        "v",
+        "v",
+        "your own picture, the reference, their difference, and both with a border under the mouse",
+        to_next_lens,
+    ),
     Key("c", "c", "the file's own view again, after the mouse has changed it", to_file_view),
     Key("l", "l", "hide the legend, or show it", show_legend),
-    Key("r", "r", "read the scene's file again", read_again),
+    Key("r", "r", "read the files again; those that are saved are read again anyway", read_again),
     Key("s", "s", "save the picture as a PNG", save),
     Key("?", "?", "show these keys, or hide them", show_help),
     Key("\x1b", "Escape", "quit", quit_sketch),
@@ -172,6 +212,11 @@ def drag(view: View, at: Place) -> View:
         return replace(view, wish="")
     orbit = replace(held.orbit.pulled(right, down), nearer=view.orbit.nearer)
     return replace(_bare(view), orbit=orbit, grip=replace(held, pulls=True))
+
+
+def hover(view: View, at: Place) -> View:
+    """The view when the mouse has gone there with no button held."""
+    return replace(view, border=at[0], wish="")
 
 
 def release(view: View) -> View:

@@ -20,9 +20,10 @@ from PIL import Image, ImageDraw, ImageFont
 from raytracer import METHODS
 from raytracer.image import to_bytes
 from raytracer.methods import CERTIFIED
-from sketch.controls import KEYS, MOUSE, Place, View
+from raytracer.plug import PlugError
+from sketch.controls import DIFFERENCE, KEYS, MOUSE, OWN, WIPE, Place, View
 from sketch.rays import Ink
-from sketch.worker import Drawing
+from sketch.worker import Drawing, Reference
 
 SMALLEST = 320  # a smaller picture stands in the middle of a canvas of this side, so that text has room
 STRIP = 48  # the height of the status under the picture
@@ -79,6 +80,8 @@ class Panel:
     rows: tuple[tuple[str, str], ...]
     colour: Colour = BRIGHT  # of the title
     type: int = 16  # the largest that it is set in
+    quote: tuple[str, int] | None = None  # a line of a file, last, with a caret after so many of its characters
+    is_banner: bool = False  # whether it lies at the top, so that most of the picture is seen
 
 
 @dataclass(frozen=True)
@@ -107,8 +110,10 @@ def status(view: View, drawing: Drawing | None, size: int, frames_a_second: floa
     how = view.stage if view.method == CERTIFIED else f"{view.stage} · {view.method}"
     if view.samples_of_stage != 1:
         how += f" · {view.samples} samples"
+    if view.lens != OWN:
+        how += f" · {view.lens}"
     figures = f"{view.place + 1} of {len(view.scenes)} · {how} · {size} × {size} · {time}"
-    path = f"{drawing.path} path" if drawing is not None and drawing.path else ""
+    path = "" if drawing is None else drawing.parts or (drawing.path and f"{drawing.path} path")
     return Status(view.scene.stem, figures, *_remark(view, drawing), path)
 
 
@@ -129,6 +134,8 @@ def _remark(view: View, drawing: Drawing | None) -> tuple[str, Colour]:
     """The second line: the answer to the last key, else warnings and wrong pixels, else what the method is."""
     if view.note:
         return view.note, BRIGHT
+    if view.lens != OWN and drawing is not None and drawing.reference is not None:
+        return _verdict(drawing.reference)
     if drawing is not None and (drawing.wrong or drawing.warnings):
         wrong = [f"{drawing.wrong:,} of {drawing.picture[..., 0].size:,} pixels are wrong"] if drawing.wrong else []
         return "; ".join([*wrong, *drawing.warnings]), AMBER
@@ -137,13 +144,38 @@ def _remark(view: View, drawing: Drawing | None) -> tuple[str, Colour]:
     return "? shows the keys" if view.method == CERTIFIED else f"{view.method}: {METHODS[view.method].about}", DIM
 
 
+def _verdict(reference: Reference) -> tuple[str, Colour]:
+    """How far the picture is from the reference, and why, if that is known."""
+    found = reference.comparison
+    if not found.wrong:
+        return ("no pixel differs" if not found.largest else "no pixel differs by more than 1"), DIM
+    figures = f"{found.wrong:,} of {found.pixels:,} pixels are wrong, by up to {found.largest}"
+    return "; ".join([figures, *(f"looks like: {cause}" for cause in reference.causes)]), AMBER
+
+
+def through_lens(view: View, drawing: Drawing) -> np.ndarray:
+    """What the view wants to see of a drawing: uint8 (size, size, 3)."""
+    reference = drawing.reference
+    if reference is None or view.lens == OWN:
+        return drawing.picture
+    if view.lens == WIPE:
+        border = drawing.picture.shape[1] // 2 if view.border is None else view.border
+        both = np.where(np.arange(drawing.picture.shape[1])[:, None] < border, drawing.picture, reference.picture)
+        both[:, border] = 255 - both[:, border]
+        return both
+    return reference.difference if view.lens == DIFFERENCE else reference.picture
+
+
 def help_panel() -> Panel:
     return Panel("Keys and mouse", (*((row.label, row.does) for row in KEYS), *MOUSE))
 
 
-def error_panel(path: Path, error: str) -> Panel:
-    """The message about a scene that cannot be drawn; its folder is known, its name is enough."""
-    return Panel("This scene cannot be drawn", (("", error.replace(str(path), path.name)),), AMBER)
+def error_panel(drawing: Drawing) -> Panel:
+    """The message about a picture that cannot be drawn; the file's folder is known, its name is enough."""
+    fault = drawing.fault
+    path = drawing.request.path if fault is None else fault.path
+    title = f"{path.name} cannot be drawn with" if isinstance(fault, PlugError) else "This scene cannot be drawn"
+    return Panel(title, (("", drawing.error.replace(str(path), path.name)),), AMBER, 15, drawing.quote, is_banner=True)
 
 
 def story_panel(lines: tuple[str, ...], over_rays: bool = False) -> Panel:
@@ -210,7 +242,7 @@ def _lay_over(
     room = side if mark is None else max(mark[1], side - mark[1]) - _REACH
     text = _panel(panel, side - 2 * MARGIN, room - 2 * MARGIN)
     height, width = text.shape[:2]
-    left, top = (side - width) // 2, (side - height) // 2
+    left, top = (side - width) // 2, MARGIN if panel.is_banner else (side - height) // 2
     if mark is not None:
         top = MARGIN if mark[1] > side // 2 else side - height - MARGIN
     if mark is not None and inked is not None:
@@ -291,20 +323,25 @@ def _typeset(panel: Panel, size: int, room: int, height: int, cut: bool = False)
         for label, text in panel.rows
         for first, line in zip(chain([True], repeat(False)), wrapped(text, size, room - 2 * pad - left), strict=False)
     ]
-    fitting = (height - 2 * pad - leading // 2) // leading - 1  # under the title
-    if len(lines) > fitting:
+    quote, caret = panel.quote or ("", 0)
+    quoted = 2 if quote else 0  # lines
+    fitting = (height - 2 * pad - leading // 2) // leading - 1 - quoted  # under the title
+    if len(lines) > fitting or (not cut and _length(quote, size) > room - 2 * pad):
         if not cut:
             return None
-        lines = [*lines[: fitting - 1 - _ENDING], ("", "…"), *lines[-_ENDING:]]
-    widest = max(_length(line, size) for _, line in lines)
-    width = min(room, round(2 * pad + max(left + widest, _length(panel.title, size)) + 1))
-    image = Image.new("RGBA", (width, 2 * pad + leading * (1 + len(lines)) + leading // 2), PANEL)
+        lines = [*lines[: fitting - 1 - _ENDING], ("", "…"), *lines[-_ENDING:]] if len(lines) > fitting else lines
+    widest = max(*(left + _length(line, size) for _, line in lines), _length(panel.title, size), _length(quote, size))
+    width = min(room, round(2 * pad + widest + 1))
+    image = Image.new("RGBA", (width, 2 * pad + leading * (1 + len(lines) + quoted) + leading // 2), PANEL)
     draw, y = ImageDraw.Draw(image), pad + leading + leading // 2
     draw.text((pad, pad), shortened(panel.title, size, width - 2 * pad), panel.colour, font(size))
     for label, line in lines:
         draw.text((pad, y), label, AMBER, font(size))
         draw.text((pad + left, y), line, BRIGHT, font(size))
         y += leading
+    if quote:
+        draw.text((pad, y + pad // 3), shortened(quote, size, width - 2 * pad), DIM, font(size))
+        draw.text((pad + _length(quote[:caret], size), y + pad // 3 + leading), "^", AMBER, font(size))
     return image
 
 

@@ -7,20 +7,24 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import replace
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from raytracer import STAGES, SceneError, interpreter, probe_pixel, render_scene
 from raytracer.camera import make_raster
+from raytracer.compare import DIFFERENCES_LEGEND
 from raytracer.methods import CERTIFIED
+from raytracer.plug_process import PATIENCE, PlugRunner
 from sketch import controls
-from sketch.controls import View
+from sketch.controls import DIFFERENCE, OWN, WIPE, View
 from sketch.files import save_beside
 from sketch.orbit import seen_from
-from sketch.overlay import Layout, Legend, Panel, compose, error_panel, help_panel, status, story_panel
+from sketch.overlay import Layout, Legend, Panel, compose, error_panel, help_panel, status, story_panel, through_lens
 from sketch.pace import FrameRate
 from sketch.rays import Ink, ink_of, lines_of
+from sketch.watch import Watcher
 from sketch.worker import BLANK, Drawing, Renderer, Request
 
 _PATIENCE = 5.0  # seconds that the end waits for a picture to be saved
@@ -37,7 +41,7 @@ class Story(NamedTuple):
 class Session:
     """One user looking at one folder. `changed` is called, on any thread, when `content` would be another."""
 
-    def __init__(self, view: View, size: int) -> None:
+    def __init__(self, view: View, size: int, patience: float = PATIENCE) -> None:
         self.layout = Layout(size)
         self.changed: Callable[[], object] = lambda: None
         self._view = view
@@ -47,8 +51,10 @@ class Session:
         self._story: Story | None = None
         self._chores = ThreadPoolExecutor(1, "chores")  # what takes a moment and is not drawing
         self._failure: BaseException | None = None  # of a chore
-        self._renderer = Renderer(lambda: self.changed())
+        plug = PlugRunner(view.plug, patience, self._say, ahead=True) if view.plug is not None else None
+        self._renderer = Renderer(lambda: self.changed(), plug)
         self._renderer.post(self._request(view))
+        self._watcher = Watcher(self._watched, lambda path: self._change(lambda view: controls.saved(view, path)))
 
     @property
     def failure(self) -> BaseException | None:
@@ -73,6 +79,12 @@ class Session:
         corner = self.layout.corner
         self._change(lambda view: controls.drag(view, (x - corner, y - corner)))
 
+    def hover(self, x: int, y: int) -> None:
+        """The mouse goes to a place of the window with no button held."""
+        pixel = self.layout.pixel(x, y)
+        if self._view.lens == WIPE and pixel is not None:
+            self._change(lambda view: controls.hover(view, pixel))
+
     def release(self) -> None:
         """The mouse lets go."""
         self._change(controls.release)
@@ -85,7 +97,7 @@ class Session:
         """All that the window shows: uint8 (height, width, 3), or `out` filled with it."""
         view, drawing, size = self._view, self._renderer.drawing, self.layout.size
         self._count(drawing)
-        picture = np.full((size, size, 3), BLANK, np.uint8) if drawing is None else drawing.picture
+        picture = np.full((size, size, 3), BLANK, np.uint8) if drawing is None else through_lens(view, drawing)
         panel = self._panel(view, drawing)
         legend = () if panel is not None else self._legend(view, drawing)
         lines = status(view, drawing, size, self._frames.a_second)
@@ -106,6 +118,7 @@ class Session:
 
     def close(self) -> None:
         """End all work. Pictures that are being saved are finished first, unless that takes too long."""
+        self._watcher.close()
         self._renderer.close()
         with suppress(TimeoutError):
             self._chores.submit(int).result(_PATIENCE)  # a chore that does nothing, behind all others
@@ -127,8 +140,17 @@ class Session:
 
     def _request(self, view: View) -> Request:
         return Request(
-            view.scene, view.stage, self.layout.size, view.method, view.readings, view.orbit, view.samples_of_stage
-        )
+            view.scene, view.stage, self.layout.size, view.method, view.readings, view.orbit, view.samples_of_stage,
+            0 if view.plug is None else view.plug_readings + 1, view.lens != OWN and view.has_own,
+        )  # fmt: skip
+
+    def _watched(self) -> list[Path]:
+        return [path for path in (self._view.scene, self._view.plug) if path is not None]
+
+    @staticmethod
+    def _say(line: str) -> None:
+        """A plugged file prints."""
+        print(line, flush=True)  # noqa: T201 (on its behalf)
 
     def _panel(self, view: View, drawing: Drawing | None) -> Panel | None:
         """What lies over the picture."""
@@ -137,7 +159,7 @@ class Session:
         if (story := self._told(view)) is not None:
             return story_panel(story.lines, over_rays=story.ink is not None)
         if drawing is not None and drawing.error:
-            return error_panel(drawing.request.path, drawing.error)
+            return error_panel(drawing)
         return None
 
     def _told(self, view: View) -> Story | None:
@@ -148,7 +170,11 @@ class Session:
     @staticmethod
     def _legend(view: View, drawing: Drawing | None) -> Legend:
         """What the colours of the picture mean, if its stage says so."""
-        return STAGES[drawing.request.stage].legend if view.legend and drawing is not None else ()
+        if drawing is None or not view.legend:
+            return ()
+        if view.lens == DIFFERENCE and drawing.reference is not None:
+            return DIFFERENCES_LEGEND
+        return STAGES[drawing.request.stage].legend
 
     # Chores have a thread of their own, so that no handler waits for them.
 
@@ -189,11 +215,13 @@ class Session:
                 return "not saved: there is no picture"
             request = seen.request
         if seen is not None and seen.full and seen.request == request:
-            picture = seen.picture
+            picture = through_lens(self._view, seen)
+        elif request.plug:
+            return "not saved: the picture is not finished"
         else:  # not finished, given up for the next one, or coarse
             size, scene = request.size, seen_from(interpreter(request.path), request.orbit)
             picture = render_scene(scene, request.stage, size, size, method=request.method)
-        return f"saved {save_beside(_file_name(request), picture)}"
+        return f"saved {save_beside(_file_name(request, self._view), picture)}"
 
     def _seen(self) -> Drawing | None:
         """Whose picture is seen: under the message about a broken scene, still that of the one before."""
@@ -201,7 +229,8 @@ class Session:
         return self._renderer.whole if latest is not None and latest.error else latest
 
 
-def _file_name(request: Request) -> str:
+def _file_name(request: Request, view: View) -> str:
     """What a saved picture is called, without .png."""
     method = () if request.method == CERTIFIED else (request.method,)
-    return "-".join([request.path.stem, request.stage, *method])
+    plug = () if view.plug is None else (view.plug.stem,)
+    return "-".join([request.path.stem, request.stage, *method, *plug, *([view.lens] if request.compared else [])])

@@ -94,6 +94,10 @@ class Window(py5.Sketch):  # type: ignore[misc] # py5 has no types
         self.session.drag(self.mouse_x, self.mouse_y)
 
     @guarded
+    def mouse_moved(self) -> None:
+        self.session.hover(self.mouse_x, self.mouse_y)
+
+    @guarded
     def mouse_released(self) -> None:
         if self.mouse_button == self.LEFT:
             self.session.release()

@@ -1,7 +1,7 @@
 """Drawing in the background: post a request, look at what has come of it whenever you like. The latest request wins.
 
 While the camera moves, a frame is shown when it is finished, as coarse as it must be to keep pace; when the camera has
-come to rest, the picture is drawn in full.
+come to rest, the picture is drawn in full. A plugged file draws only then, since it may take its time.
 """
 
 from __future__ import annotations
@@ -15,9 +15,13 @@ from pathlib import Path
 
 import numpy as np
 
-from raytracer import Cancelled, Scene, SceneError, backend, interpreter, make_plan
+from raytracer import Cancelled, Scene, backend, interpreter, make_plan
+from raytracer.compare import Comparison, compare, difference_picture
+from raytracer.faults import FileError
 from raytracer.image import to_bytes
 from raytracer.methods import CERTIFIED
+from raytracer.plug import Order
+from raytracer.plug_process import PlugRunner
 from raytracer.render import draw, warm_up
 from raytracer.samples import Samples, draw_samples
 from raytracer.scene import Vector
@@ -41,10 +45,22 @@ class Request:
     readings: int = 0  # another number means that the file is to be read again
     orbit: Orbit = HOME  # where the scene is seen from
     samples: Samples = 1  # rays a pixel, once the camera is at rest
+    plug: int = 0  # which version of the plugged file draws it; 0 for none
+    compared: bool = False  # whether it is compared with the reference
 
     def is_like(self, other: Request) -> bool:
         """Whether it differs from the other one in nothing but where the scene is seen from."""
         return replace(self, orbit=other.orbit) == other
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What a picture ought to be, and how far it is from that."""
+
+    picture: np.ndarray  # uint8 (size, size, 3)
+    difference: np.ndarray  # the same shape, in the colours of DIFFERENCES_LEGEND
+    comparison: Comparison
+    causes: tuple[str, ...] = ()  # typical mistakes that make this difference, if any are known to
 
 
 @dataclass(frozen=True)
@@ -61,7 +77,11 @@ class Drawing:
     milliseconds: float = 0.0  # that drawing took
     wrong: int | None = None  # pixels whose hit or shape is wrong; None where the stage does not tell
     warnings: tuple[str, ...] = ()
-    error: str = ""  # what is wrong with the scene, in one line
+    parts: str = ""  # of a plugged file that had a part in it, and the file's name
+    reference: Reference | None = None  # what it is compared with
+    error: str = ""  # what is wrong with the scene, or with the plugged file, in one line
+    fault: FileError | None = None  # the same, if it is in a file
+    quote: tuple[str, int] | None = None  # the line of that, and after how many characters the fault begins
 
     @property
     def whole(self) -> bool:
@@ -75,11 +95,12 @@ class Drawing:
 class Renderer:
     """A thread that draws what is asked for. `changed` is called on that thread whenever there is more to see."""
 
-    def __init__(self, changed: Callable[[], object]) -> None:
+    def __init__(self, changed: Callable[[], object], plug: PlugRunner | None = None) -> None:
         self.drawing: Drawing | None = None  # the latest
         self.whole: Drawing | None = None  # the last one that was finished, a frame or a picture
         self.failure: BaseException | None = None  # a mistake of this program, not of a scene's author: end it
         self._changed = changed
+        self._plug = plug
         self._wanted: Request | None = None
         self._closed = False
         self._news = threading.Condition()
@@ -103,6 +124,8 @@ class Renderer:
         with self._news:
             self._closed = True
             self._news.notify()
+        if self._plug is not None:
+            self._plug.close()
 
     def get_faster(self) -> None:
         """Once there is a picture, load the compiled path for those to come. Nobody waits for it, not even the end."""
@@ -150,14 +173,18 @@ class Renderer:
             if self._moving:
                 self._draw_frame(request)
             elif self._shows(request):
-                self._come_to_rest()
+                self._come_to_rest(request)
             else:
                 self._draw_picture(request)
+            if request.compared and not self._moving:
+                self._compare()
         except Cancelled:
             return
-        except (SceneError, OSError, MemoryError) as error:
+        except (FileError, OSError, MemoryError) as error:
             message = str(error) or f"{request.path}: not enough memory"
-            self.drawing = Drawing(request, self._canvas(request.size), error=message)
+            fault = error if isinstance(error, FileError) else None
+            quote = fault.quote() if fault is not None else None
+            self.drawing = Drawing(request, self._canvas(request.size), error=message, fault=fault, quote=quote)
         self._changed()
 
     def _draw_frame(self, request: Request) -> None:
@@ -180,18 +207,29 @@ class Renderer:
         self.drawing = self.whole = frame
 
     def _shows(self, request: Request) -> bool:
-        """Whether the request's picture is there already: as the last frame, in full."""
-        return (
-            self.drawing is not None
-            and self.drawing.full
-            and self.drawing.request is request
-            and (request.samples == 1 or not self.drawing.moving)
-        )
+        """Whether the request's picture is there already, in full: as the last frame, or not compared yet."""
+        seen = self.drawing
+        if seen is None or not seen.full or replace(seen.request, compared=request.compared) != request:
+            return False
+        return not seen.moving or (request.samples == 1 and not request.plug)
 
-    def _come_to_rest(self) -> None:
+    def _come_to_rest(self, request: Request) -> None:
         assert self.drawing is not None
+        wrong = _wrong(request, self.drawing.picture)
+        self.drawing = self.whole = replace(self.drawing, request=request, moving=False, wrong=wrong)
+
+    def _compare(self) -> None:
+        """Draw what the picture ought to be, and see how far it is from that."""
         drawing = self.drawing
-        self.drawing = self.whole = replace(drawing, moving=False, wrong=_wrong(drawing.request, drawing.picture))
+        assert drawing is not None
+        assert drawing.scene is not None
+        if drawing.reference is None:
+            size = drawing.request.size
+            plan = make_plan(drawing.scene, drawing.request.stage, size, size)
+            expected = draw_samples(plan, drawing.request.samples, cancelled=self._superseded)
+            found = drawing.picture
+            reference = Reference(expected, difference_picture(found, expected), compare(found, expected))
+            self.drawing = self.whole = replace(drawing, reference=reference)
 
     def _draw_picture(self, request: Request) -> None:
         """The picture in full, seen as it grows."""
@@ -209,16 +247,39 @@ class Renderer:
                 self.drawing = replace(drawing, done=done / total)
                 self._changed()
 
-        drawn = draw if request.samples == 1 else partial(draw_samples, samples=request.samples)
-        drawn(plan, out=drawing.picture, progress=progress, cancelled=self._superseded)
+        parts = self._draw_by_plug(drawing) if request.plug else ""
+        if not parts:
+            drawn = draw if request.samples == 1 else partial(draw_samples, samples=request.samples)
+            drawn(plan, out=drawing.picture, progress=progress, cancelled=self._superseded)
         elapsed = 1000 * (time.perf_counter() - start)
-        if loaded is backend.loaded():  # else it took the time to load the compiler too
+        if loaded is backend.loaded() and not parts:  # else it took the time to load the compiler too
             self._pace.took(1, elapsed, plan.path_name)
         wrong = _wrong(request, drawing.picture)
-        self.drawing = self.whole = replace(drawing, done=1.0, milliseconds=elapsed, wrong=wrong)
+        self.drawing = self.whole = replace(drawing, done=1.0, milliseconds=elapsed, wrong=wrong, parts=parts)
+
+    def _draw_by_plug(self, drawing: Drawing) -> str:
+        """Have the plugged file draw; which of its parts did, or nothing if it has none in this picture."""
+        assert self._plug is not None
+        assert drawing.scene is not None
+        request, picture = drawing.request, drawing.picture
+
+        def tell(so_far: np.ndarray, done: float) -> None:
+            picture[...] = so_far
+            self.drawing = replace(drawing, done=min(done, 0.999))
+            self._changed()
+
+        order = Order(drawing.scene, request.stage, request.size, request.size, method=request.method)
+        found, names = self._plug.draw(order, tell, self._superseded)
+        if found is None:
+            return ""
+        picture[...] = found
+        return f"{self._plug.path.name}: {', '.join(names)}"
 
     def _superseded(self) -> bool:
-        return self._closed or self._wanted is not None
+        """Whether another picture is wanted; one that is to be compared too is the same."""
+        wanted, last = self._wanted, self._last
+        other = wanted is not None and (last is None or replace(wanted, compared=last.compared) != last)
+        return self._closed or other
 
     def _scene(self, request: Request) -> Scene:
         """The request's scene, as it is seen; its file is read only when it is another one, or when asked for."""

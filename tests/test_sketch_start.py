@@ -122,7 +122,7 @@ def test_wrong_arguments(tmp_path, arguments):
 def test_any_method_can_be_the_first(folder, monkeypatch, method):
     opened = []
     monkeypatch.setattr(sketch_main, "why_no_window", lambda: "")
-    monkeypatch.setattr(sketch_main, "open_window", lambda view, size: opened.append(view) or 0)
+    monkeypatch.setattr(sketch_main, "open_window", lambda view, *_: opened.append(view) or 0)
     assert sketch_main.main([str(folder), "--method", method, "--stage", "error"]) == 0
     assert [(view.method, view.stage) for view in opened] == [(method, "error")]
 
