@@ -6,18 +6,22 @@ import argparse
 import signal
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
+from importlib import resources
 from pathlib import Path
 from threading import Event
 from types import FrameType
 from typing import NamedTuple
 
+import numpy as np
 from tqdm import tqdm
 
-from raytracer import Plan, SceneError, interpreter, make_plan, probe_pixel, save_png
+from raytracer import Plan, Scene, SceneError, interpreter, make_plan, probe_pixel, save_png
 from raytracer.camera import SAMPLINGS
 from raytracer.image import check_can_save
 from raytracer.methods import CERTIFIED, METHODS
+from raytracer.plug import Order, PlugError
+from raytracer.plug_process import PATIENCE, PlugRunner, plugged_file, seconds
 from raytracer.samples import SAMPLES, Samples, check_samples, draw_samples
 from raytracer.stages import STAGES
 
@@ -35,10 +39,54 @@ def render(arguments: argparse.Namespace) -> int:
             bar.total = total
             bar.update(1)
 
-        picture = draw_samples(
-            plan, arguments.samples, threads=arguments.threads, progress=show, cancelled=_interrupted.is_set
-        )
+        picture = _by_plug(arguments, plan.scene) if arguments.plug else None
+        if picture is None:
+            picture = draw_samples(
+                plan, arguments.samples, threads=arguments.threads, progress=show, cancelled=_interrupted.is_set
+            )
     save_png(arguments.output, picture)
+    return 0
+
+
+def _by_plug(arguments: argparse.Namespace, scene: Scene) -> np.ndarray | None:
+    """The picture by a plugged file; None if none of its functions has a part in it."""
+    width, height = arguments.size
+    order = Order(scene, arguments.stage, width, height, arguments.sampling, arguments.method)
+    with closing(PlugRunner(arguments.plug, arguments.patience, print)) as runner:
+        picture, names = runner.draw(order, cancelled=_interrupted.is_set)
+    if not names:
+        print(f"{arguments.plug}: has no part in stage {arguments.stage}", file=sys.stderr)
+    return picture
+
+
+def test(arguments: argparse.Namespace) -> int:
+    """Put a plugged file to the test, check by check; the exit status is 1 if a scene of the course is wrong."""
+    from raytracer.exam import HARD, STABILITY, Result, summary
+
+    results: list[Result] = []
+    course = sorted(arguments.scenes.glob("*.cli"))
+    if not course:
+        raise ValueError(f"{arguments.scenes}: found no scene (.cli), expected a folder of some")
+    hard = sorted((arguments.scenes / HARD).glob("*.cli"))
+    with (
+        closing(PlugRunner(arguments.plug, arguments.patience, print)) as runner,
+        tqdm(bar_format="{desc}", leave=False, disable=None) as line,
+    ):
+
+        def tell(result: Result) -> None:
+            results.append(result)
+            line.set_description_str(f"{result.check}: {result.subject}")
+
+        names = runner.examine([*course, *hard], arguments.size, tell)
+    print(f"{arguments.plug}: {', '.join(names)}", *summary(results), sep="\n")
+    return int(
+        any(not r.right for r in results if r.check != STABILITY and r.subject in {path.stem for path in course})
+    )
+
+
+def template(arguments: argparse.Namespace) -> int:
+    """Print a file to begin with: a stage, a method, a tracer of one's own, to be plugged in."""
+    print(resources.files("raytracer").joinpath("templates", f"{arguments.kind}.py").read_text("utf-8"), end="")
     return 0
 
 
@@ -156,6 +204,8 @@ class Argument(NamedTuple):
     options: dict[str, object]
 
 
+SCENES = Path(__file__).resolve().parent.parent / "scenes"
+TEMPLATES = ("tracer", "picture", "stage", "method")
 _SCENE = Argument(("scene",), {"metavar": "SCENE", "type": Path, "help": "a .cli file"})
 _METHOD = Argument(
     ("--method",), {"choices": METHODS, "default": CERTIFIED, "help": "how rays meet spheres, default certified"}
@@ -168,6 +218,15 @@ _PICTURE = (
         {"choices": SAMPLINGS, "default": "corner", "help": "where in a pixel its ray goes through, default corner"},
     ),
     _METHOD,
+)
+_PATIENCE = Argument(
+    ("--patience",),
+    {
+        "metavar": "SECONDS",
+        "type": seconds,
+        "default": PATIENCE,
+        "help": f"how long a plugged file may show no sign of life, default {PATIENCE:g}",
+    },
 )
 _FOLDER = Argument(
     ("-o", "--output"),
@@ -194,7 +253,32 @@ COMMANDS: dict[str, tuple[Callable[[argparse.Namespace], int], tuple[Argument, .
                 },
             ),
             Argument(("--threads",), {"metavar": "N", "type": count, "help": "default: as many as there are cores"}),
+            Argument(
+                ("--plug",),
+                {
+                    "metavar": "FILE.py",
+                    "type": plugged_file,
+                    "help": "a file whose functions stand in for the tracer's",
+                },
+            ),
+            _PATIENCE,
         ),
+    ),
+    "test": (
+        test,
+        (
+            Argument(("plug",), {"metavar": "FILE.py", "type": plugged_file, "help": "the file to test"}),
+            Argument(("--size",), {"metavar": "N", "type": count, "default": 48, "help": "pixels a side, default 48"}),
+            Argument(
+                ("--scenes",),
+                {"metavar": "FOLDER", "type": Path, "default": SCENES, "help": "default: the project's own"},
+            ),
+            _PATIENCE,
+        ),
+    ),
+    "template": (
+        template,
+        (Argument(("kind",), {"choices": TEMPLATES, "help": "what the file is to define"}),),
     ),
     "check": (check, (Argument(("scenes",), {"metavar": "SCENE", "type": Path, "nargs": "+", "help": ".cli files"}),)),
     "explain": (explain, (_SCENE, *_PICTURE)),
@@ -268,7 +352,7 @@ def main(words: list[str] | None = None) -> int:
         try:
             status = int(arguments.function(arguments))
         except (ValueError, OSError, MemoryError) as error:
-            print(_one_line(error), file=sys.stderr)
+            print(error.report() if isinstance(error, PlugError) else _one_line(error), file=sys.stderr)
             return 1
         except BaseException:
             if not _interrupted.is_set():

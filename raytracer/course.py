@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from raytracer.arrays import Hits
 from raytracer.camera import Vectors, directions_of, eye_grid
 from raytracer.image import to_bytes
-from raytracer.plan import Plan
+from raytracer.plan import Plan, make_plan
 from raytracer.render import colours_of, hits_of, open_tracer
 from raytracer.scene import Light, Material, Scene, Shape, Sphere, Triangle, Vector, vector
 from raytracer.stages import Block, Whole
@@ -102,6 +102,19 @@ def draw_one_by_one(
     return picture
 
 
+def hits_one_by_one(functions: Functions, plan: Plan) -> Hits:
+    """What the eye's rays hit, by these functions: t and index, (height, width)."""
+    height, width = plan.raster.height, plan.raster.width
+    loop = _Loop(functions, plan, False)
+    ys, xs = (grid.reshape(-1) for grid in np.mgrid[0:height, 0:width])
+    return Hits(*(array.reshape(height, width) for array in loop.block(ys, xs).hits))
+
+
+def hits_of_rays(functions: Functions, scene: Scene, origins: np.ndarray, directions: np.ndarray) -> Hits:
+    """What rays (n, 3) from origins (n, 3) hit, by these functions: t and index, (n,)."""
+    return _Loop(functions, make_plan(scene, "hit", 1, 1), False).traced(origins, directions)
+
+
 def chunks(height: int, width: int) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
     """All pixels, each once, coarse ones first: how large they are drawn, rows (n,) and columns (n,)."""
     for stride in STRIDES:
@@ -135,7 +148,7 @@ class _Loop:
             hits = Hits(*(array[pixels] for array in self._hits))
         else:
             directions = np.stack(rays, axis=1)
-            hits = self._traced(np.broadcast_to(self._plan.scene.camera.eye, directions.shape), directions)
+            hits = self.traced(np.broadcast_to(self._plan.scene.camera.eye, directions.shape), directions)
         truth = None if self._truth is None else Hits(*(array[pixels] for array in self._truth))
         return Block(self._plan.scene, self._plan.raster, ys, hits, self._plan.lights, xs, truth=truth, rays=rays)
 
@@ -171,7 +184,7 @@ class _Loop:
         x, y, z = np.array(found).T
         return x, y, z
 
-    def _traced(self, origins: np.ndarray, directions: np.ndarray) -> Hits:
+    def traced(self, origins: np.ndarray, directions: np.ndarray) -> Hits:
         """What rays (n, 3) from origins (n, 3) hit: by the functions that are there, of other shapes by the tracer."""
         scene, asked = self._plan.scene, self._asked
         balls, corners = (scene.spheres.centres, scene.spheres.radii), scene.triangles.vertices
@@ -195,7 +208,7 @@ class _Loop:
 
     def _nearest(self, ray: Ray) -> Hit | None:
         """What a ray from anywhere meets first."""
-        scene, hits = self._plan.scene, self._traced(np.array([ray.origin], float), np.array([ray.direction], float))
+        scene, hits = self._plan.scene, self.traced(np.array([ray.origin], float), np.array([ray.direction], float))
         t, index = float(hits.t[0]), int(hits.index[0])
         if index < 0:
             return None

@@ -78,6 +78,11 @@ class Eye(NamedTuple):
         found = in_twofold(source.bundle(pixel), source.candidates(pixel), self.targets)
         return "integers" if found.unsure[0] else "two-fold float64"
 
+    @_NOT_A_NUMBER_IS_NO_ERROR
+    def doubtful(self, rows: slice) -> np.ndarray:
+        """Which pixels of these rows float64 is not certain of: bool (rows, width)."""
+        return self._first(rows).unsure
+
     def _refine(self, hits: Hits, rows: slice, which: np.ndarray) -> np.ndarray:
         """Bring the t of these hits to the last digit, and return those of which that is not certain."""
         ys, xs = which.nonzero()

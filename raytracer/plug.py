@@ -101,6 +101,8 @@ def load_plug(path: Path) -> Plug:
 
 def _plug_of(path: Path, names: dict[str, Any]) -> Plug:
     functions = {name: names[name] for name in PARTS if callable(names.get(name))}
+    if "render_scene" in functions:  # what else there is serves that one
+        functions = {"render_scene": functions["render_scene"]}
     if not functions:
         own = [
             name for name, value in names.items() if isinstance(value, FunctionType) and value.__module__ != __name__

@@ -35,7 +35,7 @@ MOST_LINES, LONGEST_LINE = 1000, 2000  # that are printed of each picture, and c
 _LOOK = 0.02  # seconds between two questions whether the picture is still wanted
 _OFTEN = 0.05  # seconds from one message about the picture to the next
 
-Tell = Callable[[np.ndarray, float], object]
+Tell = Callable[..., object]  # see `draw_plugged` and `exam.examine`
 Names = tuple[str, ...]
 Say = Callable[[str], object]
 
@@ -84,6 +84,11 @@ class PlugRunner:
         found: tuple[np.ndarray | None, Names] = self.run("draw", order, tell, cancelled)
         return found
 
+    def examine(self, scenes: list[Path], size: int, tell: Tell) -> Names:
+        """Tell the results of `exam.examine` one by one; which functions the file has. Raises `PlugError`."""
+        names: Names = self.run("examine", (scenes, size), tell, lambda: False)
+        return names
+
     def run(self, task: str, given: Any, tell: Tell, cancelled: Callable[[], bool]) -> Any:
         """Have a task of `_TASKS` done by a process of its own."""
         child, self._spare = self._spare or _Child(), None
@@ -120,7 +125,7 @@ class PlugRunner:
                 self.say(content)
                 continue
             heard = time.monotonic()
-            if kind == "picture":
+            if kind == "news":
                 tell(*content)
             elif kind == "done":
                 return content
@@ -204,7 +209,15 @@ def _draw(plug: Plug, order: Order, send: _Sender) -> tuple[np.ndarray | None, N
     return draw_plugged(plug, order, send.picture) if names else None, names
 
 
-_TASKS: dict[str, Callable[[Plug, Any, _Sender], Any]] = {"draw": _draw}
+def _examine(plug: Plug, given: tuple[list[Path], int], send: _Sender) -> Names:
+    from raytracer.exam import examine
+
+    for result in examine(plug, *given):
+        send("news", (result,))
+    return tuple(plug.functions)
+
+
+_TASKS: dict[str, Callable[[Plug, Any, _Sender], Any]] = {"draw": _draw, "examine": _examine}
 
 
 class _Sender:
@@ -223,7 +236,7 @@ class _Sender:
         now = time.monotonic()
         if now - self._last > _OFTEN:
             self._last = now
-            self("picture", (picture, done))
+            self("news", (picture, done))
 
 
 class _Printer(io.TextIOBase):

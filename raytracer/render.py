@@ -16,7 +16,7 @@ from raytracer import backend
 from raytracer.arrays import FullPaints, Hits, Paints
 from raytracer.eye import Eye, count_tests
 from raytracer.image import to_bytes
-from raytracer.methods import CERTIFIED
+from raytracer.methods import CERTIFIED, Method
 from raytracer.plan import Plan, make_plan
 from raytracer.pool import share
 from raytracer.scene import Camera, Light, Materials, Scene, Spheres
@@ -279,7 +279,7 @@ def eye_hits(
     height: int = 320,
     *,
     sampling: str = "corner",
-    method: str = CERTIFIED,
+    method: str | Method = CERTIFIED,
     threads: int | None = None,
 ) -> Hits:
     """What each pixel's eye ray hits first: t (float64, +inf for a miss) and index (int32, −1), both (height, width).

@@ -174,7 +174,7 @@ def error_panel(drawing: Drawing) -> Panel:
     """The message about a picture that cannot be drawn; the file's folder is known, its name is enough."""
     fault = drawing.fault
     path = drawing.request.path if fault is None else fault.path
-    title = f"{path.name} cannot be drawn with" if isinstance(fault, PlugError) else "This scene cannot be drawn"
+    title = f"{path.name} cannot draw this picture" if isinstance(fault, PlugError) else "This scene cannot be drawn"
     return Panel(title, (("", drawing.error.replace(str(path), path.name)),), AMBER, 15, drawing.quote, is_banner=True)
 
 
