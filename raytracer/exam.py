@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from math import isqrt
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,7 @@ from raytracer.trace import ray_intersect_scene
 from raytracer.verify import true_hits
 
 _RAYS, _SEED = 128, 1  # of each family
+_MOST_CALLS = 1_000_000  # for a picture
 _CLOSE = 1e-6  # how far t may be off, relatively
 _TOLERANCE = 1  # bytes
 _GREY = Materials(np.full((1, 11), 0.5))
@@ -71,12 +73,18 @@ def examine(plug: Plug, scenes: list[Path], size: int) -> Iterator[Result]:
     for check, (names, ask) in _CHECKS.items():
         if plug.functions.keys() & names:
             subjects = FAMILIES if check == STABILITY else [name_of(path) for path, _ in read]
-            given = [(family,) for family in FAMILIES] if check == STABILITY else [(*pair, size) for pair in read]
+            sized = [(path, scene, _affordable(size, scene)) for path, scene in read]
+            given = [(family,) for family in FAMILIES] if check == STABILITY else sized
             for subject, arguments in zip(subjects, given, strict=True):
                 try:
                     yield from ask(plug, *arguments)
                 except PlugError as error:
                     yield Result(check, subject, fault=str(error))
+
+
+def _affordable(size: int, scene: Scene) -> int:
+    """A smaller size where a function is asked about many shapes for each pixel."""
+    return max(1, min(size, isqrt(_MOST_CALLS // max(1, len(scene)))))
 
 
 def _read(path: Path) -> Scene:
