@@ -259,7 +259,7 @@ def test_a_file_opens_its_folder_at_that_file(start, folder, expected):
 def test_a_broken_first_scene_opens_the_window_with_a_message(start, folder, expected):
     sketch = start(folder / f"{BROKEN}.cli", "--size", SIZE)
     sketch.wait_until(lambda: sketch.picture(SIZE).max() > 200, "the message")
-    assert len(np.unique(sketch.picture(SIZE)[:40].reshape(-1, 3), axis=0)) == 1
+    assert len(np.unique(sketch.picture(SIZE)[-40:].reshape(-1, 3), axis=0)) == 1
     sketch.press("s", "1")
     sketch.wait_for_picture(expected(NAMES[0], "diffuse"), "the first scene")
     sketch.interrupt()
