@@ -117,6 +117,28 @@ def inspect(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def compare(arguments: argparse.Namespace) -> int:
+    """Compare a picture with another, or with a scene: exit status 0 if they agree, 1 if not, 2 if unreadable."""
+    from raytracer.grade import View, grade
+
+    view = View(arguments.stage, arguments.sampling, arguments.method, arguments.size)
+    try:
+        verdict = grade(
+            arguments.found,
+            arguments.expected,
+            view,
+            tolerance=arguments.tolerance,
+            allowed=arguments.allow,
+            output=arguments.output,
+            cancelled=_interrupted.is_set,
+        )
+    except (ValueError, OSError, MemoryError) as error:
+        print(_one_line(error), file=sys.stderr)
+        return 2
+    print(verdict.as_json() if arguments.json else "\n".join(verdict.lines()))
+    return 0 if verdict.passed else 1
+
+
 def verify(arguments: argparse.Namespace) -> int:
     """Compare a method with exact arithmetic on rays of every family."""
     from raytracer.families import FAMILIES
@@ -192,6 +214,12 @@ def count(text: str) -> int:
     return int(text)
 
 
+def whole(text: str) -> int:
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"found {text!r}, expected a whole number, 0 or more")
+    return int(text)
+
+
 def samples(text: str) -> Samples:
     """A number of samples, or a word."""
     return int(text) if text.isdigit() else text
@@ -210,13 +238,17 @@ _SCENE = Argument(("scene",), {"metavar": "SCENE", "type": Path, "help": "a .cli
 _METHOD = Argument(
     ("--method",), {"choices": METHODS, "default": CERTIFIED, "help": "how rays meet spheres, default certified"}
 )
+_STAGE = Argument(
+    ("--stage",), {"choices": STAGES, "default": "diffuse", "help": "what is drawn; the default is diffuse"}
+)
+_SAMPLING = Argument(
+    ("--sampling",),
+    {"choices": SAMPLINGS, "default": "corner", "help": "where in a pixel its ray goes through, default corner"},
+)
 _PICTURE = (
-    Argument(("--stage",), {"choices": STAGES, "default": "diffuse", "help": "what is drawn; the default is diffuse"}),
+    _STAGE,
     Argument(("--size",), {"metavar": "WxH", "type": size, "default": (320, 320), "help": "pixels, default 320x320"}),
-    Argument(
-        ("--sampling",),
-        {"choices": SAMPLINGS, "default": "corner", "help": "where in a pixel its ray goes through, default corner"},
-    ),
+    _SAMPLING,
     _METHOD,
 )
 _PATIENCE = Argument(
@@ -292,6 +324,34 @@ COMMANDS: dict[str, tuple[Callable[[argparse.Namespace], int], tuple[Argument, .
             Argument(("--pytest",), {"action": "store_true", "help": "print the pixel as a test case instead"}),
         ),
     ),
+    "compare": (
+        compare,
+        (
+            Argument(
+                ("found",), {"metavar": "A", "help": "a picture, or a scene: scene.cli, scene.cli:stage[:method]"}
+            ),
+            Argument(("expected",), {"metavar": "B", "help": "what it should be: a picture, or a scene"}),
+            Argument(
+                ("-o", "--output"),
+                {"metavar": "OUT.png", "type": Path, "help": "a file for the picture of the differences"},
+            ),
+            Argument(
+                ("--tolerance",),
+                {"metavar": "N", "type": whole, "default": 1, "help": "by which a byte may be off, default 1"},
+            ),
+            Argument(
+                ("--allow",), {"metavar": "N", "type": whole, "default": 0, "help": "wrong pixels to pass, default 0"}
+            ),
+            Argument(("--json",), {"action": "store_true", "help": "print the figures for a program"}),
+            _STAGE,
+            Argument(
+                ("--size",),
+                {"metavar": "WxH", "type": size, "help": "of scenes, default that of the picture, or 320x320"},
+            ),
+            _SAMPLING,
+            _METHOD,
+        ),
+    ),
     "chart": (
         chart,
         (
@@ -346,7 +406,10 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def main(words: list[str] | None = None) -> int:
-    """Run one command; the exit status is 0, 1 for bad input, 2 for wrong arguments, 130 when interrupted."""
+    """Run one command; the exit status is 0, 1 for bad input, 2 for wrong arguments, 130 when interrupted.
+
+    `compare` has its own: 1 if pictures differ, 2 for bad input.
+    """
     arguments = _parser().parse_args(words)
     with _noting_interrupts():
         try:

@@ -105,7 +105,7 @@ def difference_picture(found: np.ndarray, expected: np.ndarray) -> np.ndarray:
 
 
 def mean_flip(found: np.ndarray, expected: np.ndarray) -> float | None:
-    """The mean of FLIP: how much of a difference one sees who flips between the pictures, 0 to 1; None if not installed.
+    """The mean of FLIP, 0 to 1: what one sees who flips between the two pictures. None where it is not installed.
 
     P. Andersson, J. Nilsson, T. Akenine-Möller, M. Oskarsson, K. Åström, M. Fairchild, FLIP: A Difference Evaluator for
     Alternating Images, 2020. At 67 pixels a degree, as it stands in `flip-evaluator`.
@@ -137,7 +137,7 @@ def _counts(off: np.ndarray) -> np.ndarray:
     """How many bytes are off by 0, 1, … 255: int64 (256,)."""
     flat = off.reshape(-1)
     chunks = (flat[start : start + _CHUNK] for start in range(0, len(flat), _CHUNK))
-    return np.sum([np.bincount(chunk, minlength=256) for chunk in chunks], axis=0, dtype=np.int64)
+    return np.asarray(np.sum([np.bincount(chunk, minlength=256) for chunk in chunks], axis=0))
 
 
 @lru_cache(maxsize=1)

@@ -1,0 +1,497 @@
+"""`MISTAKES`: what usually goes wrong in a tracer, and which of it a picture shows.
+
+A mistake is a step of the guide's tracer (see `raytracer.guide`) done in another way. A picture shows it if the tracer
+with this mistake draws the same wrong pixels, within 1: nearly all of those that are wrong, and of those that would be
+wrong by it. Looked at are some thousand pixels, half of them wrong ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from itertools import chain, combinations
+from time import perf_counter
+
+import numpy as np
+
+from raytracer.camera import focal_length
+from raytracer.compare import TOLERANCE, differences
+from raytracer.guide import LOOKS, Array, Guide, Place, Steps, dot, facet_normal, to_screen, unit
+from raytracer.image import to_bytes
+from raytracer.render import render_scene
+from raytracer.scene import Camera, Colour, Light, Scene
+from raytracer.stages import BLACK, Stage
+
+_ALIKE = 0.99  # of the pixels that tell must be as the mistake draws them, but for
+_STRAYS = 2  # pixels that lie on an edge, and may be on either side of it
+_FEWEST = 6  # pixels that a mistake must explain
+_LOOKED_AT = 1024  # wrong pixels, and as many others
+_AT_FIRST = 32  # wrong pixels, and as many others, that a mistake is tried on before
+_KNOWN = 0.5  # of the wrong pixels must be such that the guide's tracer draws them rightly, if it makes no mistake
+_MOST_LIGHTS = 4
+_SECONDS = 1.5  # after which no more pairs of mistakes are tried
+MOST_SHAPES = 1000  # every shape is tested with every ray
+
+
+@dataclass(frozen=True)
+class Mistake:
+    """One row of `MISTAKES`: which steps it does in another way, and what to do instead."""
+
+    steps: dict[str, object]  # fields of `Steps`
+    instead: str
+    allowed: bool = False  # it changes no byte by more than 1
+    judge: Callable[[_Evidence], float] | None = None  # in place of `_Evidence.explained`
+
+    def done(self, steps: Steps) -> Steps:
+        return replace(steps, **self.steps)  # type: ignore[arg-type]
+
+
+def _moved(columns: int, rows: int) -> Callable[[Array, Array, int, int], Place]:
+    """What should be in a pixel is as many columns to the right of it, and rows below."""
+    return lambda x, y, width, height: (x - columns, y - rows)
+
+
+def _upside_down(x: Array, y: Array, width: int, height: int) -> Place:
+    return x, height - 1 - y
+
+
+def _v_negated(x: Array, y: Array, width: int, height: int) -> Place:
+    U, V = to_screen(x, y, width, height)
+    return U, -V
+
+
+def _left_right(x: Array, y: Array, width: int, height: int) -> Place:
+    return width - 1 - x, y
+
+
+def _u_negated(x: Array, y: Array, width: int, height: int) -> Place:
+    U, V = to_screen(x, y, width, height)
+    return -U, V
+
+
+def _to_the_last_pixel(x: Array, y: Array, width: int, height: int) -> Place:
+    """U and V reach 1 in the last pixel, not beside it."""
+    aspect, right, bottom = width / height, max(width - 1, 1), max(height - 1, 1)
+    return aspect * (2 * x / right - 1), 1 - 2 * y / bottom
+
+
+def _horizontal(x: Array, y: Array, width: int, height: int) -> Place:
+    return (2 * x - width) / width, (height - 2 * y) / width
+
+
+def _stretched(x: Array, y: Array, width: int, height: int) -> Place:
+    return (2 * x - width) / width, (height - 2 * y) / height
+
+
+def _whole_angle(fov: float) -> float:
+    return float(1 / np.tan(np.radians(fov)))
+
+
+def _not_inverted(fov: float) -> float:
+    return 1 / focal_length(fov)
+
+
+def _degrees(fov: float) -> float:
+    return float(1 / np.tan(fov / 2))
+
+
+def _one(fov: float) -> float:
+    return 1.0
+
+
+def _eye_at_zero(camera: Camera) -> Camera:
+    return replace(camera, eye=(0.0, 0.0, 0.0))
+
+
+def _no_frame(camera: Camera) -> Camera:
+    return Camera(camera.eye, fov=camera.fov)
+
+
+def _backwards(camera: Camera, U: Array, V: Array, d: float) -> Array:
+    u, v, w = np.array([camera.u, camera.v, camera.w])
+    return U[:, None] * u + V[:, None] * v + d * w
+
+
+def _plus_eye(camera: Camera, U: Array, V: Array, d: float) -> Array:
+    """The point on the screen, with the eye not taken off."""
+    return camera.eye + _backwards(camera, U, V, -d)
+
+
+def _far(near: Array, far: Array, least: Array) -> Array:
+    return np.where(far > least, far, np.inf)
+
+
+def _only_near(near: Array, far: Array, least: Array) -> Array:
+    return np.where(near > least, near, np.inf)
+
+
+def _behind_too(near: Array, far: Array, least: Array) -> Array:
+    return np.where(np.isnan(near), np.inf, near)
+
+
+def _last(t: Array) -> Array:
+    return t.shape[1] - 1 - np.isfinite(t)[:, ::-1].argmax(axis=1)
+
+
+def _first(t: Array) -> Array:
+    return np.isfinite(t).argmax(axis=1)
+
+
+def _farthest(t: Array) -> Array:
+    return np.where(np.isfinite(t), t, -np.inf).argmax(axis=1)
+
+
+def _times_r(P: Array, centre: Array, radius: Array) -> Array:
+    return P - centre
+
+
+def _inwards(P: Array, centre: Array, radius: Array) -> Array:
+    return (centre - P) / radius[:, None]
+
+
+def _from_origin(P: Array, centre: Array, radius: Array) -> Array:
+    return unit(P)
+
+
+def _as_wound(normal: Array, D: Array) -> Array:
+    return unit(normal)
+
+
+def _against_winding(normal: Array, D: Array) -> Array:
+    return -unit(normal)
+
+
+def _away_from_viewer(normal: Array, D: Array) -> Array:
+    return -facet_normal(normal, D)
+
+
+def _long_normal(normal: Array, D: Array) -> Array:
+    return np.where(dot(normal, D)[:, None] > 0, -normal, normal)
+
+
+def _long(P: Array, light: Array) -> Array:
+    return light - P
+
+
+def _from_light(P: Array, light: Array) -> Array:
+    return unit(P - light)
+
+
+def _position(P: Array, light: Array) -> Array:
+    return unit(np.broadcast_to(light, P.shape))
+
+
+def _faded(diffuse: Array, light: Array, cosine: Array) -> Array:
+    return diffuse * cosine
+
+
+def _srgb(C: Array) -> Array:
+    """IEC 61966-2-1."""
+    C = np.clip(np.nan_to_num(C), 0.0, 1.0)
+    return to_bytes(np.where(C <= 0.0031308, 12.92 * C, 1.055 * C ** (1 / 2.4) - 0.055))
+
+
+def _gamma(C: Array) -> Array:
+    return to_bytes(np.clip(np.nan_to_num(C), 0.0, 1.0) ** (1 / 2.2))
+
+
+def _cut_off(C: Array) -> Array:
+    return (np.clip(np.nan_to_num(C), 0.0, 1.0) * 255.0).astype(np.uint8)
+
+
+def _wrapped(C: Array) -> Array:
+    return (np.nan_to_num(C) * 255.0 + 0.5).astype(np.int64).astype(np.uint8)
+
+
+def _nothing(t: Array) -> Array:
+    t[...] = np.inf
+    return np.zeros(len(t), int)
+
+
+def _black(colour: Colour) -> Colour:
+    return BLACK
+
+
+def _mirrored_light(N: Array, L: Array, D: Array) -> Array:
+    """R·V, for the light's own mirrored ray R."""
+    return dot(2 * dot(N, L)[:, None] * N - L, -D)
+
+
+def _half_way_beyond(N: Array, L: Array, D: Array) -> Array:
+    return dot(unit(L + D), N)
+
+
+def _no_distance(near: Array, far: Array, least: Array, distance: Array) -> Array:
+    return (near > least) | (far > least)
+
+
+def _never(near: Array, far: Array, least: Array, distance: Array) -> Array:
+    return np.zeros(near.shape, bool)
+
+
+def _into_the_mirror(D: Array, N: Array) -> Array:
+    return 2 * dot(N, D)[:, None] * N - D
+
+
+def _mean(total: Array, lights: int) -> Array:
+    return total / max(lights, 1)
+
+
+def _only(some: Sequence[Light], lights: Sequence[Light]) -> Sequence[Light]:
+    return some
+
+
+def _acne(evidence: _Evidence) -> float:
+    """Speckles, in which some of the lights are missing; a mirror shows those of other shapes, and does not tell."""
+    guide, x, y, lights = evidence.guide, evidence.x, evidence.y, evidence.guide.scene.lights
+    if not evidence.speckled or guide.stage != "full" or len(lights) > _MOST_LIGHTS:
+        return 0.0
+    no_mirror = replace(guide.steps, reflections=0)
+    dull = (guide.paint(no_mirror, x, y) == evidence.right).all(axis=1)
+    explained = np.zeros(len(x), bool)
+    for some in chain.from_iterable(combinations(lights, n) for n in range(len(lights))):
+        drawn = guide.paint(replace(no_mirror, lights=partial(_only, some)), x, y)
+        explained |= _off(drawn, evidence.found) <= evidence.tolerance
+    return share_of(evidence.wrong & dull, explained)
+
+
+SHADING = "diffuse · light · max(0, N·L)"
+
+MISTAKES = {
+    "nothing is hit": Mistake({"seen": _nothing}, "a ray hits where the discriminant is not negative and t > 0"),
+    "the lights add nothing": Mistake({"matt": lambda d, i, c: 0 * d * i, "shiny": lambda s, i, x: 0 * s}, SHADING),
+    # the picture
+    "upside down": Mistake({"pixel": _upside_down}, "row 0 is the top one, V = (H − 2y) / H"),
+    "V negated": Mistake({"screen": _v_negated}, "row 0 is the top one, V = (H − 2y) / H"),
+    "left and right exchanged": Mistake({"pixel": _left_right}, "U = (2x − W) / H, u points to the right"),
+    "U negated": Mistake({"screen": _u_negated}, "U = (2x − W) / H, u points to the right"),
+    "one row too high": Mistake({"pixel": _moved(0, -1)}, "V = (H − 2y) / H: row 0 has V = 1"),
+    "one row too low": Mistake({"pixel": _moved(0, 1)}, "V = (H − 2y) / H: row 0 has V = 1"),
+    "one column too far left": Mistake({"pixel": _moved(-1, 0)}, "U = (2x − W) / H, from x = 0"),
+    "one column too far right": Mistake({"pixel": _moved(1, 0)}, "U = (2x − W) / H, from x = 0"),
+    "rays through the pixels' centres": Mistake({"shift": 0.5}, "rays go through a pixel's upper left corner"),
+    "rays through the pixels' corners": Mistake({"shift": 0.0}, "rays go through a pixel's centre"),
+    "U and V divided by W − 1 and H − 1": Mistake({"screen": _to_the_last_pixel}, "U = (2x − W) / H, V = (H − 2y) / H"),
+    "field of view taken as horizontal": Mistake({"screen": _horizontal}, "fov is vertical: divide U and V by H"),
+    "stretched to the picture's width": Mistake({"screen": _stretched}, "pixels are square: divide U by H too"),
+    "red and blue exchanged": Mistake({"to_bytes": lambda C: to_bytes(C)[:, ::-1]}, "red, green, blue"),
+    "gamma (sRGB) applied": Mistake({"to_bytes": _srgb}, "a byte is 255 · C, rounded, with no curve"),
+    "gamma 1 / 2.2 applied": Mistake({"to_bytes": _gamma}, "a byte is 255 · C, rounded, with no curve"),
+    "colours above 1 wrapped round": Mistake({"to_bytes": _wrapped}, "clip to 0…1 before a colour becomes a byte"),
+    "colours cut off, not rounded: off by 1, which is allowed": Mistake(
+        {"to_bytes": _cut_off}, "floor(255 · C + ½)", allowed=True
+    ),
+    # the ray
+    "looks backwards, + d·w": Mistake({"ray": _backwards}, "U·u + V·v − d·w: w points backwards"),
+    "eye not taken off the ray's direction": Mistake({"ray": _plus_eye}, "the direction is U·u + V·v − d·w alone"),
+    "tan(fov) in place of tan(fov / 2)": Mistake({"focal": _whole_angle}, "d = 1 / tan(fov / 2)"),
+    "tan(fov / 2) in place of 1 / tan(fov / 2)": Mistake({"focal": _not_inverted}, "d = 1 / tan(fov / 2)"),
+    "fov in degrees given to tan": Mistake({"focal": _degrees}, "tan takes radians: π / 180 · fov"),
+    "d = 1, whatever fov is": Mistake({"focal": _one}, "d = 1 / tan(fov / 2)"),
+    "eye taken as 0 0 0": Mistake({"frame": _eye_at_zero}, "a ray starts at the eye of the file"),
+    "uvw ignored": Mistake({"frame": _no_frame}, "the ray is U·u + V·v − d·w, with the file's vectors"),
+    # the hit
+    "far root taken": Mistake({"root": _far}, "the smaller root counts if it is above 0"),
+    "hits from inside missed": Mistake(
+        {"root": _only_near}, "if the smaller root is not above 0, the larger one may be"
+    ),
+    "roots behind the eye taken": Mistake({"root": _behind_too}, "a root counts only if t > 0"),
+    "last shape of the file wins": Mistake({"seen": _last}, "of all hits the one with the smallest t is seen"),
+    "first shape of the file wins": Mistake({"seen": _first}, "of all hits the one with the smallest t is seen"),
+    "farthest shape wins": Mistake({"seen": _farthest}, "of all hits the one with the smallest t is seen"),
+    # the normal
+    "normals not normalised": Mistake({"ball": _times_r}, "N = (P − C) / r"),
+    "triangles' normals not normalised": Mistake({"facet": _long_normal}, "N = n / |n|, n = (b − a) × (c − a)"),
+    "normals inwards": Mistake({"ball": _inwards}, "N = (P − C) / r"),
+    "normals from the origin": Mistake({"ball": _from_origin}, "N = (P − C) / r: take the centre off"),
+    "triangles' normals not turned to the viewer": Mistake({"facet": _as_wound}, "−N where N·D > 0"),
+    "triangles' normals against their corners' order": Mistake({"facet": _against_winding}, "−N where N·D > 0"),
+    "triangles' normals turned away": Mistake({"facet": _away_from_viewer}, "−N where N·D > 0"),
+    # the light
+    "divided by the number of lights": Mistake({"share": _mean}, "what the lights add is added up"),
+    "only the first light": Mistake({"lights": lambda lights: lights[:1]}, "what the lights add is added up"),
+    "only the last light": Mistake({"lights": lambda lights: lights[-1:]}, "what the lights add is added up"),
+    "negative N·L not clipped": Mistake({"cosine": lambda x: x}, "max(0, N·L), before it is added"),
+    "|N·L| in place of max(0, N·L)": Mistake({"cosine": abs}, "a light behind a surface adds nothing"),
+    "L not normalised": Mistake({"to_light": _long}, "L = (light − P) / |light − P|"),
+    "L from the light": Mistake({"to_light": _from_light}, "L = (light − P) / |light − P|"),
+    "P not taken off L": Mistake({"to_light": _position}, "L = (light − P) / |light − P|"),
+    "diffuse + light · max(0, N·L)": Mistake({"matt": lambda d, i, c: d + i * c}, SHADING),
+    "diffuse · light + max(0, N·L)": Mistake({"matt": lambda d, i, c: d * i + c}, SHADING),
+    "diffuse + light + max(0, N·L)": Mistake({"matt": lambda d, i, c: d + i + c}, SHADING),
+    "(diffuse + light) · max(0, N·L)": Mistake({"matt": lambda d, i, c: (d + i) * c}, SHADING),
+    "N·L left out": Mistake({"matt": lambda d, i, c: d * i + 0 * c}, SHADING),
+    "light's colour left out": Mistake({"matt": _faded, "shiny": lambda s, i, x: s * x}, SHADING),
+    "diffuse colour left out": Mistake({"matt": lambda d, i, c: i * c + 0 * d}, SHADING),
+    "ambient colour added": Mistake({"extra": lambda ambient: ambient}, "stage diffuse has no ambient term"),
+    "background black": Mistake(
+        {"background": _black, "beyond": _black}, "a ray that hits nothing brings the background"
+    ),
+    # all light
+    "no ambient colour": Mistake({"ambient": lambda a, n: 0 * a}, "ambient + …"),
+    "ambient colour once a light": Mistake({"ambient": lambda a, n: a * n}, "ambient, once"),
+    "no shadows": Mistake({"blocks": _never}, "a light adds nothing where a shape stands between P and it"),
+    "shadows of shapes beyond the light": Mistake({"blocks": _no_distance}, "only 0 < t < |light − P| blocks"),
+    "shapes shadow themselves": Mistake(
+        {"leaves": False}, "a ray does not meet the shape that it starts on: a small epsilon above 0", judge=_acne
+    ),
+    "no highlights": Mistake({"shiny": lambda s, i, x: 0 * s}, "specular · light · max(0, H·N)^power"),
+    "R·V in place of H·N": Mistake({"spark": _mirrored_light}, "H = unit(L − D)"),
+    "H from L + D": Mistake({"spark": _half_way_beyond}, "H = unit(L − D): to the viewer is −D"),
+    "highlight not times the light": Mistake({"shiny": lambda s, i, x: s * x}, "specular · light · max(0, H·N)^power"),
+    "no power": Mistake({"power": lambda x, p: np.maximum(0.0, x)}, "specular · light · max(0, H·N)^power"),
+    "no reflections": Mistake({"reflections": 0}, "+ k_refl · C of the mirrored ray"),
+    "only one reflection": Mistake({"reflections": 1}, "reflections follow each other, up to ten"),
+    "k_refl left out": Mistake({"add": lambda c, r, k: c + r}, "+ k_refl · C of the mirrored ray"),
+    "(1 − k_refl) of a shape's own light": Mistake(
+        {"add": lambda c, r, k: (1 - k) * c + k * r}, "its own light in full, + k_refl · C of the mirrored ray"
+    ),
+    "mirrored ray reversed": Mistake({"mirror": _into_the_mirror}, "D − 2 (N·D) N"),
+    "black where a mirrored ray hits nothing": Mistake({"beyond": _black}, "it brings the background"),
+}
+
+
+def recognise(
+    picture: np.ndarray,
+    scene: Scene,
+    stage: str | Stage = "diffuse",
+    sampling: str = "corner",
+    *,
+    expected: np.ndarray | None = None,
+    cancelled: Callable[[], bool] = lambda: False,
+) -> tuple[str, ...]:
+    """The mistakes that explain what is wrong with a picture of a scene, names in `MISTAKES`, the best one first.
+
+    Several are named where each would draw this picture; two that were made together are one name, with "and" between
+    them. Nothing if the picture is right, none is known, or the stage is not one that the guide's tracer draws (`LOOKS`
+    in `raytracer.guide`). `expected` is the right picture, if it is there already; `cancelled()` is asked now and then.
+    Raises ValueError for what is no picture, uint8 (height, width, 3).
+    """
+    end = perf_counter() + _SECONDS
+    if stage not in LOOKS or len(scene) > MOST_SHAPES:
+        return ()
+    assert isinstance(stage, str)
+    height, width = picture.shape[:2]
+    right = render_scene(scene, stage, width, height, sampling=sampling) if expected is None else expected
+    off = differences(picture, right)
+    if not off.any():
+        return ()
+    allowed = bool(np.count_nonzero(off > TOLERANCE) < _FEWEST)
+    tolerance = 0 if allowed else TOLERANCE
+    evidence = _gather(Guide(scene, stage, width, height, sampling), picture, right, off > tolerance, tolerance)
+    names = [name for name, mistake in MISTAKES.items() if mistake.allowed == allowed]
+    if evidence is None:
+        return ()
+    found, active = _singles(evidence, names, cancelled)
+    if not found and not allowed and np.ptp(picture.reshape(-1, 3), axis=0).any():
+        found = _pairs(evidence, active, lambda: cancelled() or perf_counter() > end)
+    return () if cancelled() else _best(found)
+
+
+def _best(found: dict[str, float]) -> tuple[str, ...]:
+    """Those that explain most."""
+    return tuple(name for name, share in found.items() if share == max(found.values()))
+
+
+def _singles(
+    evidence: _Evidence, names: list[str], cancelled: Callable[[], bool]
+) -> tuple[dict[str, float], list[str]]:
+    """How much each mistake explains, if nearly all; and those that change anything here."""
+    found, active = {}, []
+    for name in names:
+        if cancelled():
+            break
+        mistake = MISTAKES[name]
+        steps = mistake.done(evidence.guide.steps)
+        if mistake.judge is not None:
+            share = mistake.judge(evidence)
+        else:
+            active += [name] if evidence.first.is_changed(steps) else []
+            share = evidence.explained(steps)
+        if share:
+            found[name] = share
+    return found, active
+
+
+def _pairs(evidence: _Evidence, names: list[str], cancelled: Callable[[], bool]) -> dict[str, float]:
+    """The same for mistakes that were made together, about different steps."""
+    found = {}
+    for first, second in combinations(names, 2):
+        a, b = MISTAKES[first], MISTAKES[second]
+        if cancelled():
+            break
+        if not a.steps.keys() & b.steps.keys() and (share := evidence.explained(b.done(a.done(evidence.guide.steps)))):
+            found[f"{first}, and {second}"] = share
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Evidence:
+    """Some pixels of a picture, in columns x and rows y, and what they should be: arrays (n,) and, of bytes, (n, 3)."""
+
+    guide: Guide
+    x: Array
+    y: Array
+    found: Array
+    right: Array  # as the guide's tracer draws it
+    wrong: Array
+    tolerance: int
+    speckled: bool  # in the whole picture most wrong pixels have a right one beside them
+
+    def __getitem__(self, which: Array) -> _Evidence:
+        x, y, found, right, wrong = (array[which] for array in (self.x, self.y, self.found, self.right, self.wrong))
+        return replace(self, x=x, y=y, found=found, right=right, wrong=wrong)
+
+    @cached_property
+    def first(self) -> _Evidence:
+        """Enough to see that nearly all mistakes are others."""
+        some = (np.flatnonzero(which)[:_AT_FIRST] for which in (self.wrong, ~self.wrong))
+        return self[np.concatenate(list(some))]
+
+    def is_changed(self, steps: Steps) -> bool:
+        """Whether the tracer of these steps draws another picture than the right one."""
+        return bool((self.guide.paint(steps, self.x, self.y) != self.right).any())
+
+    def explained(self, steps: Steps) -> float:
+        """How much of what is wrong, or would be, is as the tracer of these steps draws it; 0 if not nearly all."""
+        return self.first._share(steps) and self._share(steps)
+
+    def _share(self, steps: Steps) -> float:
+        drawn = self.guide.paint(steps, self.x, self.y)
+        changed = _off(drawn, self.right)
+        tells = self.guide.inside(steps, self.x, self.y) & (self.wrong | (changed > self.tolerance))
+        return share_of(tells, (changed > 0) & (_off(drawn, self.found) <= self.tolerance))
+
+
+def share_of(tells: Array, explained: Array) -> float:
+    """How many of the pixels that tell are explained: 0…1; 0 if not nearly all, or too few to tell."""
+    total, good = int(tells.sum()), int((tells & explained).sum())
+    strays = total - good
+    if good < _FEWEST or strays > (1 - _ALIKE) * total + _STRAYS or _STRAYS * _FEWEST * strays > total:
+        return 0.0
+    return good / total
+
+
+def _off(a: Array, b: Array) -> Array:
+    """By how much colours (n, 3) differ in their worst byte: (n,)."""
+    return np.abs(a.astype(np.int16) - b).max(axis=1)
+
+
+def _gather(
+    guide: Guide, picture: np.ndarray, right: np.ndarray, wrong: np.ndarray, tolerance: int
+) -> _Evidence | None:
+    """Pixels of which some are wrong; None if the guide's tracer itself cannot draw most of these."""
+    random = np.random.default_rng(1)
+    some = [random.permutation(np.flatnonzero(which))[:_LOOKED_AT] for which in (wrong, ~wrong)]
+    y, x = np.unravel_index(np.concatenate(some), wrong.shape)
+    drawn = guide.paint(guide.steps, x, y)
+    evidence = _Evidence(guide, x, y, picture[y, x], drawn, wrong[y, x], tolerance, _speckled(wrong))
+    known = _off(drawn, right[y, x]) <= tolerance
+    return evidence[known] if known[: len(some[0])].mean() >= _KNOWN else None
+
+
+def _speckled(wrong: np.ndarray) -> bool:
+    around = np.pad(wrong, 1, "edge")
+    beside = around[:-2, 1:-1] & around[2:, 1:-1] & around[1:-1, :-2] & around[1:-1, 2:]
+    return bool(2 * np.count_nonzero(wrong & beside) < np.count_nonzero(wrong))

@@ -1,0 +1,254 @@
+"""Usual mistakes: each is recognised as itself, made here or elsewhere, and no other picture as any."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from conftest import COURSE, HARD, SCENES
+
+from raytracer import METHODS, STAGES, Light, Method, Stage, interpreter, make_plan, render_scene
+from raytracer.compare import differences
+from raytracer.guide import LOOKS, Guide
+from raytracer.interpreter import interpret
+from raytracer.methods import Limits, inner, minus
+from raytracer.mistakes import MISTAKES, recognise
+from raytracer.render import draw
+from raytracer.scene import Materials
+
+WIDTH, HEIGHT = 72, 60
+ENOUGH = 12  # wrong pixels, so that some tell
+ONLY_FULL = list(MISTAKES)[list(MISTAKES).index("no ambient colour") :]
+DIFFERENT = "colours cut off, not rounded: off by 1, which is allowed"
+
+
+def drawn(scene, stage, name, width=WIDTH, height=HEIGHT):
+    """The whole picture, by the guide's tracer with a mistake, or without."""
+    guide = Guide(scene, stage, width, height)
+    steps = MISTAKES[name].done(guide.steps) if name else guide.steps
+    y, x = np.mgrid[0:height, 0:width].reshape(2, -1)
+    return guide.paint(steps, x, y).reshape(height, width, 3)
+
+
+@pytest.mark.parametrize("stage", LOOKS)
+def test_the_guides_tracer_draws_what_render_scene_does(course_scene_path, stage):
+    """But for rays that are exactly tangent."""
+    scene = interpreter(course_scene_path)
+    off = differences(drawn(scene, stage, None), render_scene(scene, stage, WIDTH, HEIGHT))
+    assert np.count_nonzero(off > 1) <= 8
+
+
+def check_recognised(scene, stage, names):
+    right = render_scene(scene, stage, WIDTH, HEIGHT)
+    for name in names:
+        picture = drawn(scene, stage, name)
+        if np.count_nonzero(differences(picture, right) > (not MISTAKES[name].allowed)) > ENOUGH:
+            found = recognise(picture, scene, stage, expected=right)
+            assert name in found or any(np.array_equal(drawn(scene, stage, each), picture) for each in found), name
+        else:
+            assert recognise(picture, scene, stage, expected=right) in ((), (DIFFERENT,)), name
+
+
+def test_each_mistake_is_recognised_at_diffuse(course_scene_path):
+    check_recognised(interpreter(course_scene_path), "diffuse", MISTAKES)
+
+
+@pytest.mark.parametrize("scene", ["03_shiny_sphere", "07_colorful_lights", "09_mirror_spheres"])
+def test_each_mistake_is_recognised_at_full(scene):
+    check_recognised(interpreter(SCENES / f"{scene}.cli"), "full", [*ONLY_FULL, "normals inwards", "upside down"])
+
+
+SHADE = """
+background .1 .2 .3
+light 3 4 0  .8 .2 .2
+light -3 4 2  .2 .7 .3
+surface .5 .4 .3  .1 .1 .2  .4 .4 .4  8  .3
+sphere 1.5  0 0 -4
+sphere .5  -.8 .9 -2.9
+sphere 6   0 -7.2 -6
+sphere 1   0 .5 4
+sphere 30   0 0 0
+"""
+
+
+def far_root(origin, direction, centre, r):
+    away = minus(origin, centre)
+    a, h, c = inner(direction, direction), inner(direction, away), inner(away, away) - r * r
+    disc = h * h - a * c
+    t = (-h + np.sqrt(abs(disc))) / a
+    return np.where((disc >= 0) & (t > 0), t, np.inf)
+
+
+def near_root(origin, direction, centre, r):
+    away = minus(origin, centre)
+    a, h, c = inner(direction, direction), inner(direction, away), inner(away, away) - r * r
+    disc = h * h - a * c
+    t = (-h - np.sqrt(abs(disc))) / a
+    return np.where((disc >= 0) & (t > 0), t, np.inf)
+
+
+def shaded(term, clip=lambda x: np.maximum(x, 0), share=1):
+    """A stage like `diffuse` with another term."""
+
+    def colours(block):
+        total = np.zeros_like(block.diffuse)
+        for light in block.lights:
+            cosine = clip((block.normals * block.to_light(light)).sum(axis=1))[:, None]
+            total += term(block.diffuse, np.array(light.colour), cosine) / share
+        return block.paint(total, elsewhere=block.scene.background)
+
+    return Stage("?", colours, "a mistake", needs_normals=True, needs_lights=True)
+
+
+def picture_of(scene, stage="diffuse", method="certified", **options):
+    return draw(make_plan(scene, stage, 90, 80, method=method, **options))
+
+
+def usual(function):
+    return Method(function, "a mistake", "none", Limits())
+
+
+def of_surface(scene, column, value):
+    table = scene.materials.table.copy()
+    table[:, column] = value
+    return replace(scene, materials=Materials(table))
+
+
+ELSEWHERE = {
+    "upside down": lambda s: picture_of(s)[::-1],
+    "left and right exchanged": lambda s: picture_of(s)[:, ::-1],
+    "one row too low": lambda s: np.roll(picture_of(s), 1, axis=0),
+    "one row too high": lambda s: np.roll(picture_of(s), -1, axis=0),
+    "one column too far left": lambda s: np.roll(picture_of(s), -1, axis=1),
+    "rays through the pixels' centres": lambda s: picture_of(s, sampling="centre"),
+    "red and blue exchanged": lambda s: picture_of(s)[..., ::-1],
+    "uvw ignored": lambda s: picture_of(replace(s, camera=replace(s.camera, u=(1, 0, 0), v=(0, 1, 0), w=(0, 0, 1)))),
+    "looks backwards, + d·w": lambda s: picture_of(
+        replace(s, camera=replace(s.camera, w=tuple(-x for x in s.camera.w)))
+    ),
+    "eye taken as 0 0 0": lambda s: picture_of(replace(s, camera=replace(s.camera, eye=(0, 0, 0)))),
+    "V negated": lambda s: picture_of(replace(s, camera=replace(s.camera, v=tuple(-x for x in s.camera.v)))),
+    "far root taken": lambda s: picture_of(s, method=usual(far_root)),
+    "hits from inside missed": lambda s: picture_of(s, method=usual(near_root)),
+    "only the first light": lambda s: picture_of(replace(s, lights=s.lights[:1])),
+    "only the last light": lambda s: picture_of(replace(s, lights=s.lights[-1:])),
+    "background black": lambda s: picture_of(replace(s, background=(0, 0, 0))),
+    "divided by the number of lights": lambda s: picture_of(s, shaded(lambda d, i, c: d * i * c, share=2)),
+    "negative N·L not clipped": lambda s: picture_of(s, shaded(lambda d, i, c: d * i * c, clip=lambda x: x)),
+    "|N·L| in place of max(0, N·L)": lambda s: picture_of(s, shaded(lambda d, i, c: d * i * c, clip=abs)),
+    "diffuse + light · max(0, N·L)": lambda s: picture_of(s, shaded(lambda d, i, c: d + i * c)),
+    "diffuse · light + max(0, N·L)": lambda s: picture_of(s, shaded(lambda d, i, c: d * i + c)),
+    "(diffuse + light) · max(0, N·L)": lambda s: picture_of(s, shaded(lambda d, i, c: (d + i) * c)),
+    DIFFERENT: lambda s: picture_of(
+        s, replace(STAGES["diffuse"], painter="", colours=lambda b: STAGES["diffuse"].colours(b) - 0.5 / 255)
+    ),
+}
+ELSEWHERE_FULL = {
+    "no ambient colour": lambda s: picture_of(of_surface(s, slice(3, 6), 0), "full"),
+    "no highlights": lambda s: picture_of(of_surface(s, slice(6, 9), 0), "full"),
+    "no power": lambda s: picture_of(of_surface(s, 9, 1), "full"),
+    "no reflections": lambda s: picture_of(of_surface(s, 10, 0), "full"),
+}
+
+
+@pytest.mark.parametrize("name", ELSEWHERE)
+@pytest.mark.parametrize("outside", [True, False], ids=["outside", "inside"])
+def test_mistakes_that_are_made_elsewhere_are_recognised(name, outside):
+    """By the scene, by a method, by a stage, in the finished picture: nothing of the guide's tracer draws them."""
+    scene = interpret(
+        SHADE if not outside else "eye .3 .2 1\nuvw 0 1 0 -1 0 0 0 0 1\n" + SHADE.replace("sphere 30", "#")
+    )
+    right, picture = picture_of(scene), np.ascontiguousarray(ELSEWHERE[name](scene))
+    if np.count_nonzero(differences(picture, right) > (name != DIFFERENT)) > ENOUGH:
+        assert recognise(picture, scene)[0] == name
+    else:
+        assert outside or name in ("uvw ignored", "eye taken as 0 0 0")
+        assert recognise(picture, scene) == ()
+
+
+@pytest.mark.parametrize("name", ELSEWHERE_FULL)
+def test_mistakes_of_all_light_that_are_made_elsewhere_are_recognised(name):
+    scene = interpret(SHADE)
+    assert recognise(ELSEWHERE_FULL[name](scene), scene, "full") == (name,)
+
+
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [
+        ("upside down", "diffuse + light · max(0, N·L)"),
+        ("rays through the pixels' centres", "divided by the number of lights"),
+        ("red and blue exchanged", "far root taken"),
+    ],
+)
+def test_two_mistakes_together_are_recognised(first, second):
+    scene = interpret(SHADE)
+    guide = Guide(scene, "diffuse", 90, 80)
+    y, x = np.mgrid[0:80, 0:90].reshape(2, -1)
+    picture = guide.paint(MISTAKES[second].done(MISTAKES[first].done(guide.steps)), x, y).reshape(80, 90, 3)
+    assert recognise(picture, scene) == (f"{first}, and {second}",)
+
+
+def test_with_rays_through_centres_the_corners_are_the_mistake():
+    scene = interpret(SHADE)
+    assert recognise(picture_of(scene), scene, sampling="centre") == ("rays through the pixels' corners",)
+    assert recognise(picture_of(scene, sampling="centre"), scene, sampling="centre") == ()
+
+
+def test_a_few_stray_pixels_do_not_hide_a_mistake():
+    scene = interpret(SHADE)
+    picture = picture_of(scene, sampling="centre").copy()
+    picture[40, 40:44] = 255
+    assert recognise(picture, scene) == ("rays through the pixels' centres",)
+
+
+@pytest.mark.parametrize("stage", ["diffuse", "full"])
+def test_other_pictures_show_no_mistake(stage):
+    """Noise, another scene, another stage, half of the picture missing."""
+    random = np.random.default_rng(5)
+    scene, other = (interpreter(SCENES / f"{name}.cli") for name in ("09_mirror_spheres", "04_many_spheres"))
+    right = render_scene(scene, stage, WIDTH, HEIGHT)
+    noisy = np.clip(right + random.normal(0, 5, right.shape), 0, 255).astype(np.uint8)
+    half = right.copy()
+    half[:30] = 0
+    assert recognise(right, scene, stage) == ()
+    for picture in (
+        noisy,
+        half,
+        random.integers(0, 256, right.shape, np.uint8),
+        render_scene(other, stage, WIDTH, HEIGHT),
+        render_scene(scene, "normal", WIDTH, HEIGHT),
+    ):
+        assert recognise(picture, scene, stage) == ()
+
+
+@pytest.mark.parametrize("path", HARD, ids=lambda path: path.stem)
+def test_what_rounding_makes_wrong_is_no_mistake(path):
+    scene = interpreter(path)
+    right = render_scene(scene, "diffuse", WIDTH, HEIGHT)
+    for method in METHODS:
+        found = recognise(render_scene(scene, "diffuse", WIDTH, HEIGHT, method=method), scene, expected=right)
+        assert not found or found[0] in ("nothing is hit", "the lights add nothing"), method
+
+
+def test_stages_and_scenes_that_the_guides_tracer_does_not_draw_show_no_mistake():
+    scene = interpret(SHADE)
+    for stage in (*STAGES.keys() - LOOKS.keys(), shaded(lambda d, i, c: d * i * c)):
+        assert recognise(picture_of(scene)[::-1], scene, stage, expected=picture_of(scene)) == ()
+    many = interpreter(SCENES / "hard" / "ten_thousand_spheres.cli")
+    assert recognise(picture_of(many)[::-1], many) == ()
+
+
+def test_it_can_be_given_up():
+    scene = interpret(SHADE)
+    assert recognise(picture_of(scene)[::-1], scene, cancelled=lambda: True) == ()
+
+
+def test_every_row_says_what_to_do_instead():
+    assert all(mistake.instead and mistake.steps for mistake in MISTAKES.values())
+    assert not any(", and " in name for name in MISTAKES)
+
+
+def test_a_scene_of_nothing_has_no_mistake():
+    empty = interpret("background .5 .5 .5")
+    assert recognise(np.zeros((40, 40, 3), np.uint8), empty) == ("background black",)
+    assert recognise(np.full((40, 40, 3), 128, np.uint8), replace(empty, lights=(Light((0, 0, 0), (1, 1, 1)),))) == ()
+    assert len(COURSE) == 11
