@@ -17,6 +17,7 @@ from raytracer.compare import differences
 from raytracer.course import hits_of_rays, hits_one_by_one
 from raytracer.families import FAMILIES, Bundle, bundles
 from raytracer.interpreter import SceneError, interpreter
+from raytracer.mistakes import recognise
 from raytracer.plan import make_plan
 from raytracer.plug import Order, Plug, PlugError, blaming, draw_plugged, method_of
 from raytracer.probe import probe_pixel
@@ -138,16 +139,28 @@ def _colours(plug: Plug, path: Path, scene: Scene, size: int) -> Iterator[Result
     """On hits that are right."""
     shades = {name: f for name, f in plug.functions.items() if name in ("shade", "stage", "render_scene")}
     found = draw_plugged(replace(plug, functions=shades), Order(scene, plug.stage, size, size))
-    mask = differences(found, render_scene(scene, plug.stage, size, size)) > _TOLERANCE
-    yield _result("colour", path, scene, mask, lambda x, y: f"drawn as {_listed(found[y, x])}", plug.stage)
+    expected = render_scene(scene, plug.stage, size, size)
+    mask = differences(found, expected) > _TOLERANCE
+    own_hits = "render_scene" in plug.functions
+    result = _result("colour", path, scene, mask, lambda x, y: f"{_listed(found[y, x])}", plug.stage, own_hits)
+    causes = recognise(found, scene, plug.stage, expected=expected) if mask.any() else ()
+    yield replace(result, story=(*result.story, *(f"looks like: {cause}" for cause in causes)))
 
 
 def _result(
-    check: str, path: Path, scene: Scene, mask: np.ndarray, own: Callable[[int, int], str], stage: str = "hit"
+    check: str,
+    path: Path,
+    scene: Scene,
+    mask: np.ndarray,
+    own: Callable[[int, int], str],
+    stage: str = "hit",
+    hits: bool = True,
 ) -> Result:
-    """What is wrong where the mask (height, width) says so."""
+    """What is wrong where the mask (height, width) says so; whether that may lie in the hits."""
     height, width = mask.shape
-    clear = mask & ~make_plan(scene, stage, width, height).eye.doubtful(slice(0, height)) if mask.any() else mask
+    clear = mask
+    if hits and mask.any():
+        clear = mask & ~make_plan(scene, stage, width, height).eye.doubtful(slice(0, height))
     story: tuple[str, ...] = ()
     if mask.any():
         y, x = np.argwhere(clear if clear.any() else mask)[0].tolist()

@@ -20,6 +20,7 @@ from raytracer.compare import Comparison, compare, difference_picture
 from raytracer.faults import FileError
 from raytracer.image import to_bytes
 from raytracer.methods import CERTIFIED
+from raytracer.mistakes import recognise
 from raytracer.plug import Order
 from raytracer.plug_process import PlugRunner
 from raytracer.render import draw, warm_up
@@ -229,7 +230,18 @@ class Renderer:
             expected = draw_samples(plan, drawing.request.samples, cancelled=self._superseded)
             found = drawing.picture
             reference = Reference(expected, difference_picture(found, expected), compare(found, expected))
-            self.drawing = self.whole = replace(drawing, reference=reference)
+            self.drawing = self.whole = drawing = replace(drawing, reference=reference)
+            self._changed()
+            self._find_causes(drawing, reference)
+
+    def _find_causes(self, drawing: Drawing, reference: Reference) -> None:
+        """Draw the usual mistakes, as long as nothing else is wanted, and see which explain the difference."""
+        assert drawing.scene is not None
+        causes = recognise(
+            drawing.picture, drawing.scene, drawing.request.stage, expected=reference.picture,
+            cancelled=self._superseded,
+        )  # fmt: skip
+        self.drawing = self.whole = replace(drawing, reference=replace(reference, causes=causes))
 
     def _draw_picture(self, request: Request) -> None:
         """The picture in full, seen as it grows."""

@@ -22,12 +22,12 @@ import psutil
 
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parent.parent.parent)]
 
-from conftest import run_display
-from window_driver import PROJECT, Sketch
+from conftest import run_display  # noqa: E402
+from window_driver import PROJECT, Sketch  # noqa: E402
 
-from raytracer import STAGES, interpreter, render_scene
-from sketch.controls import SCENE_KEYS
-from sketch.overlay import Layout, Status, compose
+from raytracer import STAGES, interpreter, render_scene  # noqa: E402
+from sketch.controls import SCENE_KEYS  # noqa: E402
+from sketch.overlay import Layout, Status, compose  # noqa: E402
 
 SCENES = sorted((PROJECT / "scenes").glob("*.cli"))
 SIZE = 330
@@ -100,7 +100,7 @@ def main() -> int:
     arguments = parser.parse_args()
     with run_display() as display, tempfile.TemporaryDirectory() as folder:
         outcome = soak(display, Path(folder), arguments.changes, arguments.seed)
-    print(outcome)
+    print(outcome)  # noqa: T201 (a command)
     return int(outcome.status != 0 or outcome.growth > MOST_GROWTH)
 
 
