@@ -38,6 +38,7 @@ from raytracer.arrays import (
     Seen,
     Sides,
     Slow,
+    Tiles,
     View,
     aligned,
 )
@@ -135,19 +136,26 @@ class Screen(NamedTuple):
         boxes[self.slow.ids] = self.slow.boxes
         return np.concatenate([boxes[: self.spheres], boxes[len(self.targets.balls) :]])
 
-    def bands(self, shading: float = 0.0) -> list[slice]:
-        """The picture's rows, cut between tiles into some pieces for each core, so that all are done at one time."""
+    def bands(self, shading: float = 0.0, joint: bool = False) -> list[slice]:
+        """The picture's rows, cut between tiles into pieces that take a moment.
+
+        Some for each core, so that all are done at one time, but where `joint`: all are at work on the same piece.
+        """
         height = self.kernels.TILE_HEIGHT
         rows, pixels = -(-self.raster.height // height), self.raster.height * self.raster.width
         moments = (len(self.slow.ids) + shading / 8) * pixels / _PIXELS_A_MOMENT
         moments += len(self.bins.entries) / _SPHERES_A_MOMENT
-        step = max(1, min(rows // max(4 * cores(), int(moments)), _BAND_PIXELS // (height * self.raster.width)))
+        step = rows // max(1 if joint else 4 * cores(), int(moments))
+        step = max(1, step if joint else min(step, _BAND_PIXELS // (height * self.raster.width)))
         cuts = [row * height for row in range(0, rows, step)]
         return [slice(a, b) for a, b in zip(cuts, [*cuts[1:], self.raster.height], strict=True)]
 
-    def tiles_of(self, rows: slice) -> int:
-        """How many tiles these rows have, which are cut between tiles."""
-        return -(-(rows.stop - rows.start) // self.kernels.TILE_HEIGHT) * self.bins.columns
+    def tiles_of(self, rows: slice, columns: slice = slice(None)) -> Tiles:
+        """The tiles of some rows, which are cut between tiles; or those of the first row of tiles in some columns."""
+        height, across = self.kernels.TILE_HEIGHT, self.bins.columns
+        first, count = rows.start // height * across, -(-(rows.stop - rows.start) // height) * across
+        start, stop, _ = columns.indices(count)
+        return Tiles(np.array([first + start]), first + stop)
 
     def hits(self, rows: slice, worker: int = 0, polished: bool = False) -> Hits:
         """What the rays of these rows, cut between tiles, hit first: as `Eye.hits`."""
@@ -165,7 +173,7 @@ class Screen(NamedTuple):
         """
         out = HitRows(hits.t.reshape(-1), hits.index.reshape(-1), first_row, self.raster.width)
         kernel, paints = ("find_fine_hits", self._fine_rays()) if polished else ("find_hits", _NO_PAINTS)
-        for doubtful in self.paint(kernel, rows, worker, paints, out):
+        for doubtful in self.paint(kernel, self.tiles_of(rows), worker, paints, out):
             doubtful.decide(hits, first_row)
 
     @_NOT_A_NUMBER_IS_NO_ERROR
@@ -208,23 +216,17 @@ class Screen(NamedTuple):
     def paint(
         self,
         painter: str,
-        rows: slice,
+        tiles: Tiles,
         worker: int,
         paints: Paints | FullPaints | FineRays,
         out: Canvas | HitRows,
-        tiles: tuple[int, int] | None = None,
     ) -> Iterator[Pixels]:
-        """Paint these rows, cut between tiles, by a kernel; yields doubtful pixels when there is no room for more.
-
-        Or only some of their tiles, from one on and before another, counted from 0, row by row.
+        """Paint by a kernel what nobody has taken yet of some tiles; yields doubtful pixels if there is room for no more.
 
         What is left of them `doubtful` tells.
         """
         kernel, (scratch, doubts) = getattr(self.kernels, painter), self.desks[worker]
-        height, columns = self.kernels.TILE_HEIGHT, self.bins.columns
-        first, (start, stop) = rows.start // height * columns, tiles or (0, self.tiles_of(rows))
-        tile, last = first + start, first + stop
-        while (tile := kernel(self.view, self.slow, self.bins, tile, last, scratch, doubts, paints, out)) < last:
+        while not kernel(self.view, self.slow, self.bins, tiles, scratch, doubts, paints, out):
             yield from self.doubtful(worker)
 
     def radiance(self, pixels: Pixels, hits: Hits, paints: FullPaints, worker: int) -> np.ndarray:

@@ -511,6 +511,17 @@ def fetch_ahead(typing, array, i):
     return types.void(array, types.uint64), lower
 
 
+@intrinsic
+def take_number(typing, array):
+    """An int64 array's first element, which then is one more: threads that ask at one time get different ones."""
+
+    def lower(context, builder, sig, args):
+        start = context.make_array(sig.args[0])(context, builder, args[0]).data
+        return builder.atomic_rmw("add", start, ir.Constant(ir.IntType(64), 1), "monotonic")
+
+    return types.int64(array), lower
+
+
 # ------------------------------------------------------------------------------------------------------- pixels
 
 
