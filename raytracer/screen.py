@@ -28,7 +28,6 @@ from raytracer.arrays import (
     Bins,
     Candidates,
     Canvas,
-    Facets,
     FineRays,
     FullPaints,
     HitRows,
@@ -42,10 +41,10 @@ from raytracer.arrays import (
     View,
     aligned,
 )
-from raytracer.boxes import Lens, facet_boxes, make_lens
+from raytracer.boxes import Lens, make_lens
 from raytracer.camera import Raster, eye_grid, fine_columns, fine_rows
 from raytracer.eye import bundle_of, usable_spread
-from raytracer.facets import see_facets, true_zeros
+from raytracer.facets import exact_volume
 from raytracer.full import corners_of, surfaces_of, terms_of
 from raytracer.lookup import light_cells, resolution_for, tree_of
 from raytracer.plan import Plan
@@ -289,13 +288,10 @@ def open_screen(scene: Scene, raster: Raster, kernels: ModuleType, threads: int 
     with _workspace() as workspace, np.errstate(all="ignore"):
         unit, origin, balls, corners = scene_units(scene)
         order, material = scene.numbered
-        lens, grid = make_lens(raster), eye_grid(raster)
+        lens = make_lens(raster)
         view, boxes = _view(raster, origin, balls, material), _NO_BOXES
         if len(corners):
-            facets = see_facets(grid, view.kappa, origin, corners)
-            view = _with_facets(view, facets, true_zeros(origin, corners, raster.camera), scene.triangles)
-            boxes = facet_boxes(lens, corners - origin)
-            boxes[~facets.faces] = 0
+            view, boxes = _with_facets(view, workspace, kernels, lens, raster, origin, corners, scene.triangles)
         bins, slow_ids = _sort(workspace, kernels, lens, view, len(scene.spheres), boxes, threads)
         slow, targets = _slow(lens, view, origin, balls, slow_ids, kernels)
         targets = targets._replace(corners=corners, order=order)
@@ -388,19 +384,26 @@ def _view(raster: Raster, origin: np.ndarray, balls: np.ndarray, material: np.nd
     )  # fmt: skip
 
 
-def _with_facets(view: View, facets: Facets, zeros: np.ndarray, triangles: Triangles) -> View:
-    """The view with triangles as well.
-
-    FACET numbers each: 12 of `Facets.rows`, `distance`, 3 of `true_zeros`, 3 of `Triangles.corner_numbers`, and some
-    to spare.
-    """
-    table = np.concatenate([view.balls, facets.planes.reshape(-1)])
+def _with_facets(
+    view: View, workspace: Workspace, kernels: ModuleType, lens: Lens, raster: Raster, origin: np.ndarray,
+    corners: np.ndarray, triangles: Triangles,
+) -> tuple[View, np.ndarray]:  # fmt: skip
+    """The view with triangles as well, and their boxes, int32 (n, 4): empty for those whose plane holds the eye."""
+    count, back = len(corners), view.back
+    table = workspace.array(len(view.balls) + 4 * count, np.float64, "table")
+    facets = workspace.array(FACET * count, np.float64, "facets")
+    boxes = workspace.array(4 * count, np.int32, "facet boxes")
+    table[: len(view.balls)] = view.balls
+    frame, volumes = (view.u, view.v, (-back[0], -back[1], -back[2]), raster.camera.w), np.full(count, np.nan)
+    while kernels.see_facets(
+        lens, frame, view.reach, view.kappa, view.eye, corners, triangles.corner_numbers, volumes, facets,
+        table[len(view.balls) :], boxes,
+    ):  # fmt: skip
+        for i in np.flatnonzero(np.isnan(volumes)):
+            volumes[i] = exact_volume(origin, corners[i])
+    table = table.view()
     table.flags.writeable = False  # to the kernels, arrays that can be written to are others
-    rows = np.zeros((len(facets.rows), FACET))
-    rows[:, :12], rows[:, 12], rows[:, 13:16], rows[:, 16:19] = (
-        facets.rows, facets.distance, zeros, triangles.corner_numbers,
-    )  # fmt: skip
-    return view._replace(balls=table, facets=rows.reshape(-1))
+    return view._replace(balls=table, facets=facets), boxes.reshape(-1, 4)
 
 
 def _sort(
