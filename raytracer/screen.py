@@ -328,7 +328,7 @@ def make_full_paints(plan: Plan, screen: Screen) -> FullPaints:
     return FullPaints(
         paints.background, scene.background, paints.lights, surfaces_of(scene).reshape(-1),
         corners_of(screen.origin, corners).reshape(-1), *light_cells(*shapes, screen.unit, lights, screen.kernels),
-        resolution_for(len(screen.targets.balls) + len(corners)), tree_of(*shapes, screen.unit, screen.kernels),
+        resolution_for(len(scene)), tree_of(*shapes, screen.unit, screen.kernels),
         terms.bits, terms.specular, terms.shadows, terms.mirrors,
     )  # fmt: skip
 

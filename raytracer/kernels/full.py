@@ -27,6 +27,7 @@ from raytracer.certified import inner
 from raytracer.kernels.compiler import borrowing, compiled, inlined
 from raytracer.kernels.lanes import (
     WIDTH,
+    all_of,
     any_of,
     at_least,
     equal_to,
@@ -84,7 +85,9 @@ def _light(view, paints, p, n, radius, d, where, shown, material):
     red, green, blue, spark, lights = spread(0.0), spread(0.0), spread(0.0), spread(0.0), paints.lights
     dr, dg, db, power = gather_rows(paints.surfaces, material)
     sr, sg, sb, _ = gather_rows(paints.surfaces, material + spread(np.int32(2)))
-    size, unit = size_of(p), unit_of(d)
+    size, unit = size_of(p), d
+    if paints.specular:
+        unit = unit_of(d)
     for i in range(np.uint64(len(lights))):
         light = lights[i, 0], lights[i, 1], lights[i, 2]
         facing, square = towards(p, n, light)
@@ -178,7 +181,10 @@ def _nearest(view, paints, p, d, where, from_outside, asked, scratch):
             j = tree.ids[place]
             if j < 0:
                 break
-            t = _meet(view, paints, j, p, d, a, over_a, where, size, from_outside)
+            own = equal_to(where, np.int64(j))
+            if all_of((own & from_outside) | ~asked):
+                continue
+            t = _meet(view, paints, j, p, d, a, over_a, own, size, from_outside)
             index, best = select(t < best, spread(j), index), select(t < best, t, best)
     return best, index
 
@@ -210,9 +216,9 @@ def _push(tree, eye, p, over_d, best, level, first, stack, near, top):
 
 
 @inlined
-def _meet(view, paints, j, p, d, a, over_a, where, size, from_outside):
+def _meet(view, paints, j, p, d, a, over_a, own, size, from_outside):
     """Where rays meet shape j, +inf where they do not."""
-    row, own = _row(view.balls, np.uint64(4) * np.uint64(j)), equal_to(where, np.int64(j))
+    row = _row(view.balls, np.uint64(4) * np.uint64(j))
     if j < view.first_facet:
         hit, h, c, disc = hits_sphere(away_from(row, p, view.eye), d, a, over_a, row[3], size, own, from_outside)
         t = spread(np.inf)

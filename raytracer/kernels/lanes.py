@@ -301,7 +301,7 @@ def smallest_of(typing, lanes):
     def lower(context, builder, sig, args):
         kind = ir.FunctionType(_DOUBLE, [args[0].type])
         name = f"llvm.vector.reduce.fmin.v{WIDTH}f64"
-        return builder.call(get_or_insert_function(builder.module, kind, name), args)
+        return builder.call(get_or_insert_function(builder.module, kind, name), args, fastmath=["nnan"])
 
     return types.float64(lanes), lower
 
