@@ -163,7 +163,7 @@ class World:
         """What all lights add: (n, 3)."""
         total, size, unit = np.zeros((len(where), 3)), size_of(p), unit_of(d)
         for place, colour in self.lights:
-            shine, spark = self.answers(p, n, radius, unit, place, diffuse[:, 3])
+            shine, spark = self.answers(p, n, radius, unit, place, shiny[:, :3], diffuse[:, 3])
             lit = (shine > 0.0) | (spark > 0.0)
             if self.terms.shadows and lit.any():
                 lit[lit] = ~self._blocked(_some(p, lit), place, where[lit], size[lit])
@@ -172,14 +172,18 @@ class World:
         return total
 
     def answers(
-        self, p: Three, n: Three, radius: np.ndarray, unit: Three, place: Three, power: np.ndarray
+        self, p: Three, n: Three, radius: np.ndarray, unit: Three, place: Three, colour: np.ndarray, power: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """max(0, N·L) and max(0, H·N)^power of a light at points where unit rays arrived: (n,), (n,)."""
+        """max(0, N·L) and max(0, H·N)^power of a light at points where unit rays arrived: (n,), (n,).
+
+        The latter is 0 where the specular colour, (n, 3), is black.
+        """
         facing, square = towards(p, n, place)
         shine = cosine(facing, square, radius)
         if not self.terms.specular:
             return shine, np.zeros(len(power))
-        return shine, _raised(highlight(p, n, radius, place, square, unit), power, self.terms.bits)
+        spark = _raised(highlight(p, n, radius, place, square, unit), power, self.terms.bits)
+        return shine, np.where(colour.any(axis=1), spark, 0.0)
 
     def _blocked(self, p: Three, light: Three, where: np.ndarray, size: np.ndarray) -> np.ndarray:
         """Whether something stands between P and a light: bool (n,)."""
