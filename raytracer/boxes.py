@@ -183,7 +183,9 @@ def _seen_of_corner(lens: Lens, a: Three) -> tuple[Number, Number, Number, Numbe
     return (z > depth * _SHALLOW) & found, z < -(depth * _SHALLOW), low_x, high_x, low_y, high_y
 
 
-def _widened(part: Number, z: Number, length: Number, depth: Number, size: float, scale: float) -> tuple[Number, Number]:
+def _widened(
+    part: Number, z: Number, length: Number, depth: Number, size: float, scale: float
+) -> tuple[Number, Number]:
     """Where a corner is along one axis of the screen, and by how much that may be off."""
     middle, error = scale * (part / z), _PAD + scale * (_PAD * size * length / abs(z))
     error = error + _PAD * abs(middle) * (depth / abs(z))

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -28,7 +28,7 @@ from raytracer.bounce import (
 )
 from raytracer.certified import inner
 from raytracer.facets import planes_of
-from raytracer.scene import Scene
+from raytracer.scene import Materials, Scene
 from raytracer.shading import Four, Three, cosine, highlight, land_on_any, raised_to_whole, towards, unit_of
 from raytracer.units import scene_units
 
@@ -47,17 +47,25 @@ class Terms:
 
 def terms_of(scene: Scene, lit: bool) -> Terms:
     """The terms of a scene, `lit` by any light or by none."""
-    table = scene.materials.table
+    shiny, mirrors, bits = _asked_by(scene.materials)
+    return Terms(shiny and lit, mirrors, lit and (len(scene) > 1 or shiny), bits)
+
+
+@lru_cache(maxsize=8)
+def _asked_by(materials: Materials) -> tuple[bool, bool, int]:
+    """Whether any material is shiny, whether any is a mirror, and `Terms.bits`."""
+    table = materials.table
     shiny = table[table[:, 6:9].any(axis=1)]
-    specular, powers = bool(len(shiny)) and lit, shiny[:, 9]
+    powers = shiny[:, 9]
     whole = bool(((powers == np.floor(powers)) & (powers >= 0.0) & (powers < 1 << _MOST_BITS)).all())
     bits = int(powers.max(initial=0.0)).bit_length() if whole else -1
-    return Terms(specular, bool((table[:, 10] > 0.0).any()), lit and (len(scene) > 1 or specular), bits)
+    return bool(len(shiny)), bool((table[:, 10] > 0.0).any()), bits
 
 
-def surfaces_of(scene: Scene) -> np.ndarray:
-    """The materials as three rows of four each: diffuse, power; ambient, k_refl; specular, 0: float64 (3 m, 4)."""
-    table = scene.materials.table
+@lru_cache(maxsize=8)
+def surfaces_of(materials: Materials) -> np.ndarray:
+    """As three rows of four each: diffuse, power; ambient, k_refl; specular, 0: float64 (3 m, 4)."""
+    table = materials.table
     rows = np.zeros((len(table), 3, 4))
     rows[:, :, :3] = table[:, :9].reshape(-1, 3, 3)
     rows[:, 0, 3], rows[:, 1, 3] = table[:, 9], np.maximum(table[:, 10], 0.0)
@@ -110,7 +118,7 @@ class World:
 
     @cached_property
     def surfaces(self) -> np.ndarray:
-        return surfaces_of(self.scene)
+        return surfaces_of(self.scene.materials)
 
     @cached_property
     def terms(self) -> Terms:

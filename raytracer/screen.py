@@ -220,7 +220,7 @@ class Screen(NamedTuple):
         paints: Paints | FullPaints | FineRays,
         out: Canvas | HitRows,
     ) -> Iterator[Pixels]:
-        """Paint by a kernel what nobody has taken yet of some tiles; yields doubtful pixels if there is room for no more.
+        """Paint by a kernel what nobody has taken yet of some tiles; yields doubtful pixels when their list is full.
 
         What is left of them `doubtful` tells.
         """
@@ -326,7 +326,7 @@ def make_full_paints(plan: Plan, screen: Screen) -> FullPaints:
     )
     lights = tuple(light.position for light in plan.lights) if terms.shadows else ()
     return FullPaints(
-        paints.background, scene.background, paints.lights, surfaces_of(scene).reshape(-1),
+        paints.background, scene.background, paints.lights, surfaces_of(scene.materials).reshape(-1),
         corners_of(screen.origin, corners).reshape(-1), *light_cells(*shapes, screen.unit, lights, screen.kernels),
         resolution_for(len(scene)), tree_of(*shapes, screen.unit, screen.kernels),
         terms.bits, terms.specular, terms.shadows, terms.mirrors,

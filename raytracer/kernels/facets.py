@@ -1,10 +1,10 @@
 """Triangles as seen from the eye, one after the other: what their pixels have to know of them, and their boxes.
 
-    corners   three times x y z each   float64 (n, 3, 3)
-      ↓ `facets`, `boxes.facet_box`
-    table     12 of `Facets.rows`, `distance`, 3 of `zero_side`, the numbers of the corners; FACET each, flat
-    planes    see `Facets.planes`, flat
-    boxes     as those of spheres, int32, flat
+corners   three times x y z each   float64 (n, 3, 3)
+  ↓ `facets`, `boxes.facet_box`
+table     12 of `Facets.rows`, `distance`, 3 of `zero_side`, the numbers of the corners; FACET each, flat
+planes    see `Facets.planes`, flat
+boxes     as those of spheres, int32, flat
 """
 
 import numpy as np
@@ -40,7 +40,10 @@ def see_facets(lens, frame, reach, kappa, eye, corners, numbers, volumes, table,
             _put(table, at + np.uint64(3 * edge), side, u, v, ahead, known)
             table[at + np.uint64(13 + edge)] = zero_side(of, edge, u, v, w)
             table[at + np.uint64(16 + edge)] = numbers[i, edge]
-        plane, box = plane_of(triangle, of.nearest, volume), facet_box(lens, of.corners[0], of.corners[1], of.corners[2])
+        plane, box = (
+            plane_of(triangle, of.nearest, volume),
+            facet_box(lens, of.corners[0], of.corners[1], of.corners[2]),
+        )
         for side in range(4):
             planes[np.uint64(4) * i + np.uint64(side)] = plane[side]
             boxes[np.uint64(4) * i + np.uint64(side)] = np.int32(box[side]) if volume != 0.0 else np.int32(0)
