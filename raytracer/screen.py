@@ -142,7 +142,7 @@ class Screen(NamedTuple):
         """
         height = self.kernels.TILE_HEIGHT
         rows, pixels = -(-self.raster.height // height), self.raster.height * self.raster.width
-        moments = (len(self.slow.ids) + shading / 8) * pixels / _PIXELS_A_MOMENT
+        moments = (1 + len(self.slow.ids) + shading / 8) * pixels / _PIXELS_A_MOMENT
         moments += len(self.bins.entries) / _SPHERES_A_MOMENT
         step = rows // max(1 if joint else 4 * cores(), int(moments))
         step = max(1, step if joint else min(step, _BAND_PIXELS // (height * self.raster.width)))
