@@ -249,6 +249,13 @@ class Tile(NamedTuple):
     bottom: int
 
 
+class Tiles(NamedTuple):
+    """Tiles that some threads are to paint, each the next that nobody has taken."""
+
+    next: np.ndarray  # int64 (1,), the number of that one
+    last: int  # excluded
+
+
 class Scratch(NamedTuple):
     """What a thread writes on while it does a tile."""
 

@@ -40,6 +40,12 @@ def blocks_sphere(o: Three, d: Three, a: Number, over_a: Number, radius: Number,
     return enters | leaves
 
 
+def blocks_own(o: Three, d: Three, a: Number) -> Number:
+    """`blocks_sphere` where P is on the sphere."""
+    h = inner(d[0], d[1], d[2], o[0], o[1], o[2])
+    return (h < 0.0) & ((a + h) + h > 0.0)
+
+
 def meet_sphere(
     o: Three, d: Three, a: Number, over_a: Number, radius: Number, size: Number, own: Number, from_outside: Number
 ) -> Number:

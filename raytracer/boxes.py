@@ -32,6 +32,8 @@ _SHALLOW = 1e-6  # a corner's depth, of its distance, below which its place on t
 _FARTHEST_APART = 1000  # powers of two between the lengths of the rows n
 
 Row = tuple[float, float, float]
+Three = tuple[Number, Number, Number]
+Four = tuple[Number, Number, Number, Number]
 
 
 class Lens(NamedTuple):
@@ -47,6 +49,9 @@ class Lens(NamedTuple):
     cross_y: float
     scale_x: float  # U is what the rows give, times this
     scale_y: float
+    size_x: float  # |n₁|
+    size_y: float
+    size_z: float
     crosses: float
     width: float  # in pixels
     height: float
@@ -102,8 +107,8 @@ def make_lens(raster: Raster) -> Lens:
         up_x, up_y, magnification = 0, 0, inf
     return Lens(
         nx, ny, nz, inner(*nz, *nz), inner(*nx, *nz), inner(*ny, *nz), inner(*cross_x, *cross_x),
-        inner(*cross_y, *cross_y), ldexp(1.0, up_x), ldexp(1.0, up_y), _CROSSES * magnification, width, height, shift,
-        *_cone(raster),
+        inner(*cross_y, *cross_y), ldexp(1.0, up_x), ldexp(1.0, up_y), hypot(*nx), hypot(*ny), hypot(*nz),
+        _CROSSES * magnification, width, height, shift, *_cone(raster),
     )  # fmt: skip
 
 
@@ -140,27 +145,51 @@ def box_of(lens: Lens, qx: Number, qy: Number, qz: Number, radius: Number) -> Bo
 
 
 def facet_boxes(lens: Lens, a: np.ndarray) -> np.ndarray:
-    """The boxes of pixels that may see triangles, a = corner − eye (n, 3, 3): int32 (n, 4), as for spheres.
+    """The boxes of pixels that may see triangles, a = corner − eye (n, 3, 3): int32 (n, 4), as for spheres."""
+    first, second, third = np.ascontiguousarray(np.moveaxis(a, 0, -1))
+    return np.stack(np.broadcast_arrays(*facet_box(lens, first, second, third)), axis=-1).astype(np.int32)
 
-    That of a triangle which reaches behind the eye is the whole picture; of one that is all behind it, empty.
+
+def facet_box(lens: Lens, a: Three, b: Three, c: Three) -> Four:
+    """The box of pixels that may see a triangle whose corners are these, as seen from the eye.
+
+    That of a triangle which reaches behind the eye is the whole picture; of one that is all behind it, empty. Plain
+    arithmetic (see `twofold`).
     """
-    x, y, z = (inner(*row, a[..., 0], a[..., 1], a[..., 2]) for row in (lens.nx, lens.ny, lens.nz))
-    sizes = [hypot(*row) for row in (lens.nx, lens.ny, lens.nz)]
-    length = np.sqrt(inner(*np.moveaxis(a, -1, 0), *np.moveaxis(a, -1, 0)))
-    depth = sizes[2] * length * _SHALLOW
-    front, hidden = (z > depth).all(axis=1), (z < -depth).all(axis=1)
-    sides: list[np.ndarray] = []
-    for part, size, scale, least, total in (
-        (x, sizes[0], lens.scale_x, lens.width - lens.shift, lens.width),
-        (-y, sizes[1], lens.scale_y, lens.height - lens.shift, lens.height),
-    ):
-        middle, error = scale * (part / z), _PAD + scale * (_PAD * size * length / abs(z))
-        error = error + _PAD * abs(middle) * (sizes[2] * length / abs(z))
-        sides += _pixels((middle - error).min(axis=1), (middle + error).max(axis=1), lens.height, least, total)
-    known = front & np.isfinite(sides).all(axis=0) & np.isfinite(lens.crosses)
-    whole = np.array([0, lens.width, 0, lens.height])
-    boxes = np.where(known[:, None], np.stack(sides, axis=-1), np.where(hidden[:, None], 0.0, whole))
-    return boxes.astype(np.int32)
+    ahead, behind, left, right, top, bottom = _seen_of_corner(lens, a)
+    for corner in (b, c):
+        front, back, low_x, high_x, low_y, high_y = _seen_of_corner(lens, corner)
+        ahead, behind = ahead & front, behind & back
+        left, right = select(low_x < left, low_x, left), select(high_x > right, high_x, right)
+        top, bottom = select(low_y < top, low_y, top), select(high_y > bottom, high_y, bottom)
+    known = ahead & (lens.crosses < inf)
+    left, right = _pixels(left, right, lens.height, lens.width - lens.shift, lens.width)
+    top, bottom = _pixels(top, bottom, lens.height, lens.height - lens.shift, lens.height)
+    return (
+        select(known, left, 0.0), select(known, right, select(behind, 0.0, lens.width)),
+        select(known, top, 0.0), select(known, bottom, select(behind, 0.0, lens.height)),
+    )  # fmt: skip
+
+
+def _seen_of_corner(lens: Lens, a: Three) -> tuple[Number, Number, Number, Number, Number, Number]:
+    """Whether a corner is certainly ahead, with a known place on the screen, or behind; and between which U and −V."""
+    (ax, ay, az), nx, ny, nz = a, lens.nx, lens.ny, lens.nz
+    x, y = inner(nx[0], nx[1], nx[2], ax, ay, az), inner(ny[0], ny[1], ny[2], ax, ay, az)
+    z, length = inner(nz[0], nz[1], nz[2], ax, ay, az), np.sqrt(inner(ax, ay, az, ax, ay, az))
+    depth = lens.size_z * length
+    low_x, high_x = _widened(x, z, length, depth, lens.size_x, lens.scale_x)
+    low_y, high_y = _widened(-y, z, length, depth, lens.size_y, lens.scale_y)
+    found = (low_x > -inf) & (high_x < inf) & (low_y > -inf) & (high_y < inf)
+    return (z > depth * _SHALLOW) & found, z < -(depth * _SHALLOW), low_x, high_x, low_y, high_y
+
+
+def _widened(
+    part: Number, z: Number, length: Number, depth: Number, size: float, scale: float
+) -> tuple[Number, Number]:
+    """Where a corner is along one axis of the screen, and by how much that may be off."""
+    middle, error = scale * (part / z), _PAD + scale * (_PAD * size * length / abs(z))
+    error = error + _PAD * abs(middle) * (depth / abs(z))
+    return middle - error, middle + error
 
 
 def _range(

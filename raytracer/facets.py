@@ -15,85 +15,185 @@ Triangles whose plane goes through the origin are met by no ray. Where float64 d
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from raytracer import exact
-from raytracer.arrays import Facets, Grid, Nearest, Rays, TwofoldRays, View
-from raytracer.certified import FACET_ERROR, K_ERROR, LARGEST, SMALLEST, STEEP, Three
+from raytracer.arrays import Facets, Grid, Nearest, Rays, TwofoldRays
+from raytracer.certified import FACET_ERROR, K_ERROR, LARGEST, SMALLEST, STEEP, Three, inner
 from raytracer.plain import update
-from raytracer.scene import Camera, vector
-from raytracer.twofold import Twofold, add, divide, dot, multiply, two_sum
+from raytracer.scene import vector
+from raytracer.twofold import Number, Twofold, add, divide, dot, exponent, multiply, scale, select, two_sum
 
 _NEXT = [1, 2, 0]
 
 TwofoldVector = tuple[Twofold, Twofold, Twofold]
-Measures = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+ThreeVectors = tuple[Three, Three, Three]
+Four = tuple[Number, Number, Number, Number]
 
 
-def see_facets(grid: Grid | View, kappa: float, origin: np.ndarray, corners: np.ndarray) -> Facets:
-    """All triangles (n, 3, 3) as seen from an origin (3,), for the rays of a picture; κ as for `plain.see`."""
-    measures = a, edges, sizes, lengths, normals = _measure(origin, corners)
-    volume, known, planes = _planes(origin, corners, measures)
-    known &= kappa > 0.0
-    extent = (lengths[:, 0] * lengths[:, 1])[:, None]
-    sign, scale = np.sign(volume)[:, None], np.where(known, 1.0 / grid.reach, 0.0)[:, None]
-    sides = np.cross(a, edges) * (sign * scale / (sizes * lengths))[:, :, None]
-    vectors = np.concatenate([sides, (normals * (sign * scale / extent))[:, None]], axis=1)
-    rows = np.where(known[:, None, None], vectors @ np.array([grid.u, grid.v, np.negative(grid.back)]).T, 0.0)
-    distance = np.where(known, np.abs(volume) * (scale / extent)[:, 0], 0.0)
-    return Facets(rows.reshape(len(a), 12), distance, planes, volume != 0.0)
+class Measures(NamedTuple):
+    """A triangle's corners from the origin, its edges, how long these are, a normal, and the nearest corner."""
+
+    corners: ThreeVectors
+    edges: ThreeVectors
+    sizes: Three
+    lengths: Three
+    normal: Three
+    nearest: Three
+    size: Number  # of the nearest corner
 
 
-def true_zeros(origin: np.ndarray, corners: np.ndarray, camera: Camera) -> np.ndarray:
-    """What of e₁, e₂, e₃ of triangles (n, 3, 3) is 0 without any rounding: float64 (n, 3).
+def measure(origin: Three, corners: ThreeVectors) -> Measures:
+    """Plain arithmetic (see `twofold`), as all down to `zero_sides`."""
+    a, b, c = corners
+    ab, bc, ca = _from(a, b), _from(b, c), _from(c, a)
+    a, b, c = _from(origin, a), _from(origin, b), _from(origin, c)
+    x, y, z = _size(a), _size(b), _size(c)
+    second, third = y < x, z < select(y < x, y, x)
+    nearest = (
+        select(third, c[0], select(second, b[0], a[0])),
+        select(third, c[1], select(second, b[1], a[1])),
+        select(third, c[2], select(second, b[2], a[2])),
+    )
+    size = select(third, z, select(second, y, x))
+    return Measures((a, b, c), (ab, bc, ca), (x, y, z), (_size(ab), _size(bc), _size(ca)), cross(ab, bc), nearest, size)
 
-    1 + 2 + 4 for what it is of across, of up, and besides. A difference is 0 only if it is so in truth, and a product
-    of such; so eᵢ is exactly 0 for rays through edges in the planes of an axis that go through the eye.
+
+def volume_of(of: Measures) -> tuple[Number, Number, Number]:
+    """V, whether all lengths are of a usual size, and whether V's sign is certain too."""
+    volume, usual = dot_of(of.normal, of.nearest), _usual(of.sizes) & _usual(of.lengths)
+    return volume, usual, usual & (abs(volume) > STEEP * (of.lengths[0] * of.lengths[1] * of.size))
+
+
+def plane_of(corners: ThreeVectors, nearest: Three, volume: Number) -> Four:
+    """A row of `Facets.planes`."""
+    sign, (x, y, z) = -sign_of(volume), unit_normal(corners)
+    x, y, z = sign * x, sign * y, sign * z
+    return x, y, z, dot_of((x, y, z), nearest)
+
+
+def unit_normal(corners: ThreeVectors) -> Three:
+    """The normal of length 1 of a triangle however large or small."""
+    a, b, c = corners
+    down = -exponent(_larger(_larger(_largest(a), _largest(b)), _largest(c))) - 1
+    a, b, c = _scaled(a, down), _scaled(b, down), _scaled(c, down)
+    ab, bc = _from(a, b), _from(b, c)
+    normal = cross(_scaled(ab, -exponent(_largest(ab))), _scaled(bc, -exponent(_largest(bc))))
+    size = _size(normal)
+    return normal[0] / size, normal[1] / size, normal[2] / size
+
+
+def side_of_edge(of: Measures, i: int, volume: Number, over_reach: Number) -> Three:
+    """eᵢ as a vector, of which a ray's direction makes a number."""
+    x, y, z = cross(of.corners[i], of.edges[i])
+    by = sign_of(volume) * over_reach / (of.sizes[i] * of.lengths[i])
+    return x * by, y * by, z * by
+
+
+def slope_of(of: Measures, volume: Number, over_reach: Number) -> tuple[Three, Number]:
+    """n as a vector likewise, and n·a in its unit."""
+    (x, y, z), extent = of.normal, of.lengths[0] * of.lengths[1]
+    by = sign_of(volume) * over_reach / extent
+    return (x * by, y * by, z * by), abs(volume) * (over_reach / extent)
+
+
+def zero_side(of: Measures, i: int, u: Three, v: Three, w: Three) -> Number:
+    """What of eᵢ is 0 without any rounding: 1 + 2 + 4 for what it is of across, of up, and besides.
+
+    A difference is 0 only if it is so in truth, and a product of such; so eᵢ is exactly 0 for rays through edges in the
+    planes of an axis that go through the eye.
     """
-    a, edges, i, j = corners - origin, corners[:, _NEXT] - corners, [1, 2, 0], [2, 0, 1]
-    side = ((a[..., i] == 0.0) | (edges[..., j] == 0.0)) & ((a[..., j] == 0.0) | (edges[..., i] == 0.0))
-    zero = (side[:, :, None] | (np.array([camera.u, camera.v, camera.w]) == 0.0)).all(axis=3)
-    return zero @ np.array([1.0, 2.0, 4.0])
+    a, e = of.corners[i], of.edges[i]
+    x = ((a[1] == 0.0) | (e[2] == 0.0)) & ((a[2] == 0.0) | (e[1] == 0.0))
+    y = ((a[2] == 0.0) | (e[0] == 0.0)) & ((a[0] == 0.0) | (e[2] == 0.0))
+    z = ((a[0] == 0.0) | (e[1] == 0.0)) & ((a[1] == 0.0) | (e[0] == 0.0))
+    return _if_all_vanish(x, y, z, u, 1.0) + _if_all_vanish(x, y, z, v, 2.0) + _if_all_vanish(x, y, z, w, 4.0)
+
+
+def _if_all_vanish(x: Number, y: Number, z: Number, axis: Three, number: float) -> Number:
+    return select((x | (axis[0] == 0.0)) & (y | (axis[1] == 0.0)) & (z | (axis[2] == 0.0)), number, 0.0)
+
+
+def cross(a: Three, b: Three) -> Three:
+    """a × b."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+def dot_of(a: Three, b: Three) -> Number:
+    """a · b."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def sign_of(x: Number) -> Number:
+    """−1, 0 or 1."""
+    return select(x > 0.0, 1.0, select(x < 0.0, -1.0, 0.0))
+
+
+def _from(a: Three, b: Three) -> Three:
+    return b[0] - a[0], b[1] - a[1], b[2] - a[2]
+
+
+def _size(a: Three) -> Number:
+    return np.sqrt(dot_of(a, a))
+
+
+def _scaled(a: Three, n: Number) -> Three:
+    return scale(a[0], n), scale(a[1], n), scale(a[2], n)
+
+
+def _largest(a: Three) -> Number:
+    return _larger(_larger(abs(a[0]), abs(a[1])), abs(a[2]))
+
+
+def _larger(a: Number, b: Number) -> Number:
+    return select(a < b, b, a)
+
+
+def _usual(sizes: Three) -> Number:
+    least = select(sizes[1] < sizes[0], sizes[1], sizes[0])
+    least, most = select(sizes[2] < least, sizes[2], least), _larger(_larger(sizes[0], sizes[1]), sizes[2])
+    return (least > SMALLEST) & (most < LARGEST)
+
+
+def see_facets(grid: Grid, kappa: float, origin: np.ndarray, corners: np.ndarray) -> Facets:
+    """All triangles (n, 3, 3) as seen from an origin (3,), for the rays of a picture; κ as for `plain.see`."""
+    of, volume, usual = _measured(origin, corners)
+    over_reach = np.where(usual & (kappa > 0.0), 1.0 / grid.reach, 0.0)
+    normal, distance = slope_of(of, volume, over_reach)
+    vectors = [side_of_edge(of, i, volume, over_reach) for i in range(3)] + [normal]
+    parts = [inner(*vector, *axis) for vector in vectors for axis in (grid.u, grid.v, np.negative(grid.back))]
+    rows = np.where(over_reach > 0.0, parts, 0.0).T
+    planes = np.column_stack(plane_of(vectors_of(corners), of.nearest, volume))
+    return Facets(rows, np.where(over_reach > 0.0, distance, 0.0), planes, volume != 0.0)
 
 
 def planes_of(origin: np.ndarray, corners: np.ndarray) -> np.ndarray:
     """The planes of triangles (n, 3, 3) as seen from an origin (3,): see `Facets.planes`."""
-    return _planes(origin, corners, _measure(origin, corners))[2]
+    of, volume, _ = _measured(origin, corners)
+    return np.column_stack(plane_of(vectors_of(corners), of.nearest, volume))
 
 
-def _measure(origin: np.ndarray, corners: np.ndarray) -> Measures:
-    """Corners from the origin, edges, how long these are, and normals."""
-    a, edges = corners - origin, corners[:, _NEXT] - corners
-    return a, edges, _length(a), _length(edges), normals_of(corners)
+def _measured(origin: np.ndarray, corners: np.ndarray) -> tuple[Measures, np.ndarray, np.ndarray]:
+    """Measures, V and whether all lengths are of a usual size."""
+    of = measure(vector(origin), vectors_of(corners))
+    volume, usual, certain = volume_of(of)
+    for i in np.flatnonzero(~certain):
+        volume[i] = exact_volume(origin, corners[i])
+    return of, volume, usual
 
 
-def _planes(origin: np.ndarray, corners: np.ndarray, measures: Measures) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """V, whether all lengths are of a usual size, and the planes."""
-    a, _, sizes, lengths, normals = measures
-    nearest = a[np.arange(len(a)), np.argmin(sizes, axis=1)]
-    volume, most = _dot(normals, nearest), lengths[:, 0] * lengths[:, 1] * sizes.min(axis=1)
-    usual = (sizes > SMALLEST) & (sizes < LARGEST) & (lengths > SMALLEST) & (lengths < LARGEST)
-    known = np.asarray(usual.all(axis=1))
-    for i in np.flatnonzero(~(np.abs(volume) > STEEP * most) | ~known).tolist():
-        volume[i] = _volume(origin, corners[i])
-    facing = -np.sign(volume)[:, None] * _unit_normals(corners)
-    return volume, known, np.column_stack([facing, _dot(facing, nearest)])
+def vectors_of(corners: np.ndarray) -> ThreeVectors:
+    """Triangles (n, 3, 3) as three corners of three arrays (n,) each."""
+    a, b, c = (tuple(corner) for corner in np.ascontiguousarray(np.moveaxis(corners, 0, -1)))
+    return a, b, c
 
 
 def normals_of(corners: np.ndarray) -> np.ndarray:
     """Normals of triangles (n, 3, 3), of no special length: (n, 3)."""
     normals: np.ndarray = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 1])
     return normals
-
-
-def _unit_normals(corners: np.ndarray) -> np.ndarray:
-    """`normals_of`, of length 1, for triangles however large or small."""
-    largest = np.abs(corners).max(axis=(1, 2), initial=0.0)
-    edges = np.diff(np.ldexp(corners, -np.frexp(largest)[1][:, None, None] - 1), axis=1)
-    exponents = np.frexp(np.abs(edges).max(axis=2))[1]
-    first, second = np.moveaxis(np.ldexp(edges, -exponents[:, :, None]), 1, 0)
-    normals = np.cross(first, second)
-    return normals / _length(normals)[:, None]
 
 
 def nearest_facets(origins: np.ndarray, rays: Rays, corners: np.ndarray, nearest: Nearest, number: int) -> None:
@@ -157,8 +257,8 @@ def _fine_dot(a: TwofoldVector, b: TwofoldVector) -> Twofold:
     return dot(ax, ay, az, ax_low, ay_low, az_low, bx, by, bz, bx_low, by_low, bz_low)
 
 
-def _volume(origin: np.ndarray, corners: np.ndarray) -> float:
-    """V, rounded once, but never to 0."""
+def exact_volume(origin: np.ndarray, corners: np.ndarray) -> float:
+    """V of a triangle (3, 3), rounded once, but never to 0."""
     whole = exact.volume(vector(origin), corners.reshape(-1).tolist())
     sign = float((whole > 0) - (whole < 0))
     try:

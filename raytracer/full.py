@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -28,7 +28,7 @@ from raytracer.bounce import (
 )
 from raytracer.certified import inner
 from raytracer.facets import planes_of
-from raytracer.scene import Scene
+from raytracer.scene import Materials, Scene
 from raytracer.shading import Four, Three, cosine, highlight, land_on_any, raised_to_whole, towards, unit_of
 from raytracer.units import scene_units
 
@@ -47,17 +47,25 @@ class Terms:
 
 def terms_of(scene: Scene, lit: bool) -> Terms:
     """The terms of a scene, `lit` by any light or by none."""
-    table = scene.materials.table
+    shiny, mirrors, bits = _asked_by(scene.materials)
+    return Terms(shiny and lit, mirrors, lit and (len(scene) > 1 or shiny), bits)
+
+
+@lru_cache(maxsize=8)
+def _asked_by(materials: Materials) -> tuple[bool, bool, int]:
+    """Whether any material is shiny, whether any is a mirror, and `Terms.bits`."""
+    table = materials.table
     shiny = table[table[:, 6:9].any(axis=1)]
-    specular, powers = bool(len(shiny)) and lit, shiny[:, 9]
+    powers = shiny[:, 9]
     whole = bool(((powers == np.floor(powers)) & (powers >= 0.0) & (powers < 1 << _MOST_BITS)).all())
     bits = int(powers.max(initial=0.0)).bit_length() if whole else -1
-    return Terms(specular, bool((table[:, 10] > 0.0).any()), lit and (len(scene) > 1 or specular), bits)
+    return bool(len(shiny)), bool((table[:, 10] > 0.0).any()), bits
 
 
-def surfaces_of(scene: Scene) -> np.ndarray:
-    """The materials as three rows of four each: diffuse, power; ambient, k_refl; specular, 0: float64 (3 m, 4)."""
-    table = scene.materials.table
+@lru_cache(maxsize=8)
+def surfaces_of(materials: Materials) -> np.ndarray:
+    """As three rows of four each: diffuse, power; ambient, k_refl; specular, 0: float64 (3 m, 4)."""
+    table = materials.table
     rows = np.zeros((len(table), 3, 4))
     rows[:, :, :3] = table[:, :9].reshape(-1, 3, 3)
     rows[:, 0, 3], rows[:, 1, 3] = table[:, 9], np.maximum(table[:, 10], 0.0)
@@ -110,7 +118,7 @@ class World:
 
     @cached_property
     def surfaces(self) -> np.ndarray:
-        return surfaces_of(self.scene)
+        return surfaces_of(self.scene.materials)
 
     @cached_property
     def terms(self) -> Terms:
@@ -163,7 +171,7 @@ class World:
         """What all lights add: (n, 3)."""
         total, size, unit = np.zeros((len(where), 3)), size_of(p), unit_of(d)
         for place, colour in self.lights:
-            shine, spark = self.answers(p, n, radius, unit, place, diffuse[:, 3])
+            shine, spark = self.answers(p, n, radius, unit, place, shiny[:, :3], diffuse[:, 3])
             lit = (shine > 0.0) | (spark > 0.0)
             if self.terms.shadows and lit.any():
                 lit[lit] = ~self._blocked(_some(p, lit), place, where[lit], size[lit])
@@ -172,14 +180,18 @@ class World:
         return total
 
     def answers(
-        self, p: Three, n: Three, radius: np.ndarray, unit: Three, place: Three, power: np.ndarray
+        self, p: Three, n: Three, radius: np.ndarray, unit: Three, place: Three, colour: np.ndarray, power: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """max(0, N·L) and max(0, H·N)^power of a light at points where unit rays arrived: (n,), (n,)."""
+        """max(0, N·L) and max(0, H·N)^power of a light at points where unit rays arrived: (n,), (n,).
+
+        The latter is 0 where the specular colour, (n, 3), is black.
+        """
         facing, square = towards(p, n, place)
         shine = cosine(facing, square, radius)
         if not self.terms.specular:
             return shine, np.zeros(len(power))
-        return shine, _raised(highlight(p, n, radius, place, square, unit), power, self.terms.bits)
+        spark = _raised(highlight(p, n, radius, place, square, unit), power, self.terms.bits)
+        return shine, np.where(colour.any(axis=1), spark, 0.0)
 
     def _blocked(self, p: Three, light: Three, where: np.ndarray, size: np.ndarray) -> np.ndarray:
         """Whether something stands between P and a light: bool (n,)."""

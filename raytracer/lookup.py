@@ -37,11 +37,12 @@ def light_cells(
     spheres: Spheres, triangles: Triangles, unit: int, lights: tuple[Vector, ...], path: ModuleType
 ) -> Cells:
     """The lists of the cubes of all lights, given by their places, one cube behind the other."""
-    shapes = _in_units(spheres, triangles, unit)
-    cubes = [_light_cells(*shapes, np.ldexp(light, -unit), path) for light in lights]
+    balls, corners = _in_units(spheres, triangles, unit)
+    cubes = [_light_cells(balls[: len(spheres)], corners, np.ldexp(light, -unit), path) for light in lights]
     ends = np.cumsum([0, *(len(ids) for _, ids in cubes)])
     starts = [starts + end for (starts, _), end in zip(cubes, ends[:-1], strict=True)]
-    return np.concatenate([*starts, _NO_STARTS]), np.concatenate([*(ids for _, ids in cubes), _NO_IDS])
+    ids = np.concatenate([*(ids for _, ids in cubes), _NO_IDS])
+    return np.concatenate([*starts, _NO_STARTS]), _numbers(ids, spheres)
 
 
 @lru_cache(maxsize=_KEPT)
@@ -55,8 +56,12 @@ def tree_of(spheres: Spheres, triangles: Triangles, unit: int, path: ModuleType)
     about = np.column_stack([(low + high) / 2.0, (high - low).max(axis=1) / 2.0])
     order = _order(path.along_curve(about), about[:, 3]) if len(about) else np.empty(0, np.int64)
     tree: Tree = path.enclose(low - wider, high + wider, order, np.empty(0))
-    ids = np.where(tree.ids >= len(spheres), tree.ids + (len(balls) - len(spheres)), tree.ids)
-    return tree._replace(ids=ids.astype(np.int32))
+    return tree._replace(ids=_numbers(tree.ids, spheres))
+
+
+def _numbers(places: np.ndarray, spheres: Spheres) -> np.ndarray:
+    """The numbers in `View.balls` of shapes of which the triangles follow the spheres at once: int32."""
+    return np.where(places < len(spheres), places, places + (len(spheres.balls) - len(spheres))).astype(np.int32)
 
 
 def _in_units(spheres: Spheres, triangles: Triangles, unit: int) -> tuple[np.ndarray, np.ndarray]:

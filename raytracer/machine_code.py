@@ -14,7 +14,16 @@ from pathlib import Path
 from tempfile import gettempdir
 
 _HERE = Path(__file__).parent
-_SOURCES = ("arrays", "twofold", "certified", "boxes", "shading", "bounce", "methods")  # what kernels call into
+_SOURCES = (
+    "arrays",
+    "twofold",
+    "certified",
+    "boxes",
+    "facets",
+    "shading",
+    "bounce",
+    "methods",
+)  # what kernels call into
 
 
 @cache

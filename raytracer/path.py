@@ -133,7 +133,7 @@ def _look_at(world: World, landing: _Landing, light: Light, place: Three, share:
     diffuse, shiny, unit = world.surfaces[material], world.surfaces[material + 2], unit_of(d)
     facing, square = towards(p, n, place)
     halfway = highlight(p, n, radius, place, square, unit)
-    shine, spark = world.answers(p, n, radius, unit, place, diffuse[3:])
+    shine, spark = world.answers(p, n, radius, unit, place, shiny[None, :3], diffuse[3:])
     blocker, stop, adds = None, light.position, np.zeros(3)
     if shine > 0.0 or spark > 0.0:
         way = place[0] - p[0], place[1] - p[1], place[2] - p[2]

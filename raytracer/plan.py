@@ -87,7 +87,10 @@ class Plan:
     @property
     def shading(self) -> float:
         """What a pixel's shading costs, in tests of a ray against a sphere."""
-        return _TESTS_A_LIGHT * len(self.lights)
+        if not self.stage.throws_on:
+            return _TESTS_A_LIGHT * len(self.lights)
+        bounces = _REFLECTIONS if terms_of(self.scene, bool(self.lights)).mirrors else 1
+        return _TESTS_A_LIGHT * (len(self.lights) + 1) * bounces
 
     @cached_property
     def why(self) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from raytracer import backend
-from raytracer.arrays import FullPaints, Hits, Paints
+from raytracer.arrays import FullPaints, Hits, Paints, Tiles
 from raytracer.eye import Eye, count_tests
 from raytracer.image import to_bytes
 from raytracer.methods import CERTIFIED, Method
@@ -24,8 +24,6 @@ from raytracer.screen import ALL, SPARE, Pixels, Screen, make_canvas, make_full_
 from raytracer.stages import Block, Whole
 
 _GREY = Materials(np.full((1, 11), 0.5))
-
-_PIECES = 24  # or more, of a picture whose pixels take long: so that all cores are done at about the same time
 
 Progress = Callable[[int, int, slice], object]
 
@@ -143,15 +141,14 @@ def share_pieces(bands: list[slice], watch: Watch, pieces: int, work: Callable[[
 def _paint(plan: Plan, screen: Screen, picture: np.ndarray, watch: Watch) -> None:
     """A stage that a kernel paints; numpy paints the pixels that float64 was not certain of."""
     easel = make_easel(plan, screen, picture)
-    bands = screen.bands(plan.shading)
-    pieces = -(-_PIECES // len(bands)) if plan.stage.throws_on else 1
+    bands = screen.bands(plan.shading, joint=True)
+    tiles = {rows.start: screen.tiles_of(rows) for rows in bands}
 
     def paint(rows: slice, piece: int, worker: int) -> slice:
-        tiles = screen.tiles_of(rows)
-        easel.paint(rows, worker, (tiles * piece // pieces, tiles * (piece + 1) // pieces))
+        easel.paint(tiles[rows.start], worker)
         return rows
 
-    share_pieces(bands, watch, pieces, paint)
+    share_pieces(bands, watch, len(screen.desks), paint)
     easel.finish(*range(len(screen.desks)))
 
 
@@ -170,11 +167,11 @@ class Easel:
         """The same for other rows."""
         return replace(self, picture=rows, first_row=first_row, wanted=wanted)
 
-    def paint(self, rows: slice, worker: int, tiles: tuple[int, int] | None = None) -> None:
-        """Paint some rows, or some tiles of them, as `Screen.paint` does; `finish` does the rest."""
+    def paint(self, tiles: Tiles, worker: int) -> None:
+        """Paint what is left of some tiles, as `Screen.paint` does; `finish` does the rest."""
         canvas = make_canvas(self.picture, self.first_row, self.wanted)
         assert canvas is not None
-        for doubtful in self.screen.paint(self.plan.painter, rows, worker, self.paints, canvas, tiles):
+        for doubtful in self.screen.paint(self.plan.painter, tiles, worker, self.paints, canvas):
             self._decide(doubtful, worker)
 
     def finish(self, *workers: int) -> None:

@@ -131,7 +131,7 @@ def _draw_strip(
     eights = _any_of(wanted.repeat(side, axis=1), 8)
     part = easel.on(large, large_rows.start, eights.repeat(side, axis=0).astype(np.uint8))
     for run in _runs(np.asarray(_any_of(eights, _TILE // 8).any(axis=0))):
-        part.paint(large_rows, worker, run)
+        part.paint(easel.screen.tiles_of(large_rows, run), worker)
     part.finish(worker)
     kernels.mean_of_blocks(large, side, wanted, picture)
 
@@ -142,10 +142,10 @@ def _any_of(flags: np.ndarray, columns: int) -> np.ndarray:
     return np.asarray(padded.reshape(len(flags), -1, columns).any(axis=2))
 
 
-def _runs(wanted: np.ndarray) -> Iterator[tuple[int, int]]:
-    """Where tiles are wanted one after the other: from one on, before another."""
+def _runs(wanted: np.ndarray) -> Iterator[slice]:
+    """Where tiles are wanted one after the other."""
     ends = np.flatnonzero(np.diff(np.concatenate([[False], wanted, [False]])))
-    yield from zip(ends[::2].tolist(), ends[1::2].tolist(), strict=True)
+    yield from map(slice, ends[::2].tolist(), ends[1::2].tolist())
 
 
 def _means(fine: Plan, rows: slice, hits: Hits, side: int, ys: np.ndarray, xs: np.ndarray) -> np.ndarray:

@@ -28,7 +28,6 @@ from raytracer.arrays import (
     Bins,
     Candidates,
     Canvas,
-    Facets,
     FineRays,
     FullPaints,
     HitRows,
@@ -38,13 +37,14 @@ from raytracer.arrays import (
     Seen,
     Sides,
     Slow,
+    Tiles,
     View,
     aligned,
 )
-from raytracer.boxes import Lens, facet_boxes, make_lens
+from raytracer.boxes import Lens, make_lens
 from raytracer.camera import Raster, eye_grid, fine_columns, fine_rows
 from raytracer.eye import bundle_of, usable_spread
-from raytracer.facets import see_facets, true_zeros
+from raytracer.facets import exact_volume
 from raytracer.full import corners_of, surfaces_of, terms_of
 from raytracer.lookup import light_cells, resolution_for, tree_of
 from raytracer.plan import Plan
@@ -135,19 +135,26 @@ class Screen(NamedTuple):
         boxes[self.slow.ids] = self.slow.boxes
         return np.concatenate([boxes[: self.spheres], boxes[len(self.targets.balls) :]])
 
-    def bands(self, shading: float = 0.0) -> list[slice]:
-        """The picture's rows, cut between tiles into some pieces for each core, so that all are done at one time."""
+    def bands(self, shading: float = 0.0, joint: bool = False) -> list[slice]:
+        """The picture's rows, cut between tiles into pieces that take a moment.
+
+        Some for each core, so that all are done at one time, but where `joint`: all are at work on the same piece.
+        """
         height = self.kernels.TILE_HEIGHT
         rows, pixels = -(-self.raster.height // height), self.raster.height * self.raster.width
-        moments = (len(self.slow.ids) + shading / 8) * pixels / _PIXELS_A_MOMENT
+        moments = (1 + len(self.slow.ids) + shading / 8) * pixels / _PIXELS_A_MOMENT
         moments += len(self.bins.entries) / _SPHERES_A_MOMENT
-        step = max(1, min(rows // max(4 * cores(), int(moments)), _BAND_PIXELS // (height * self.raster.width)))
+        step = rows // max(1 if joint else 4 * cores(), int(moments))
+        step = max(1, step if joint else min(step, _BAND_PIXELS // (height * self.raster.width)))
         cuts = [row * height for row in range(0, rows, step)]
         return [slice(a, b) for a, b in zip(cuts, [*cuts[1:], self.raster.height], strict=True)]
 
-    def tiles_of(self, rows: slice) -> int:
-        """How many tiles these rows have, which are cut between tiles."""
-        return -(-(rows.stop - rows.start) // self.kernels.TILE_HEIGHT) * self.bins.columns
+    def tiles_of(self, rows: slice, columns: slice = slice(None)) -> Tiles:
+        """The tiles of some rows, which are cut between tiles; or those of the first row of tiles in some columns."""
+        height, across = self.kernels.TILE_HEIGHT, self.bins.columns
+        first, count = rows.start // height * across, -(-(rows.stop - rows.start) // height) * across
+        start, stop, _ = columns.indices(count)
+        return Tiles(np.array([first + start]), first + stop)
 
     def hits(self, rows: slice, worker: int = 0, polished: bool = False) -> Hits:
         """What the rays of these rows, cut between tiles, hit first: as `Eye.hits`."""
@@ -165,7 +172,7 @@ class Screen(NamedTuple):
         """
         out = HitRows(hits.t.reshape(-1), hits.index.reshape(-1), first_row, self.raster.width)
         kernel, paints = ("find_fine_hits", self._fine_rays()) if polished else ("find_hits", _NO_PAINTS)
-        for doubtful in self.paint(kernel, rows, worker, paints, out):
+        for doubtful in self.paint(kernel, self.tiles_of(rows), worker, paints, out):
             doubtful.decide(hits, first_row)
 
     @_NOT_A_NUMBER_IS_NO_ERROR
@@ -208,23 +215,17 @@ class Screen(NamedTuple):
     def paint(
         self,
         painter: str,
-        rows: slice,
+        tiles: Tiles,
         worker: int,
         paints: Paints | FullPaints | FineRays,
         out: Canvas | HitRows,
-        tiles: tuple[int, int] | None = None,
     ) -> Iterator[Pixels]:
-        """Paint these rows, cut between tiles, by a kernel; yields doubtful pixels when there is no room for more.
-
-        Or only some of their tiles, from one on and before another, counted from 0, row by row.
+        """Paint by a kernel what nobody has taken yet of some tiles; yields doubtful pixels when their list is full.
 
         What is left of them `doubtful` tells.
         """
         kernel, (scratch, doubts) = getattr(self.kernels, painter), self.desks[worker]
-        height, columns = self.kernels.TILE_HEIGHT, self.bins.columns
-        first, (start, stop) = rows.start // height * columns, tiles or (0, self.tiles_of(rows))
-        tile, last = first + start, first + stop
-        while (tile := kernel(self.view, self.slow, self.bins, tile, last, scratch, doubts, paints, out)) < last:
+        while not kernel(self.view, self.slow, self.bins, tiles, scratch, doubts, paints, out):
             yield from self.doubtful(worker)
 
     def radiance(self, pixels: Pixels, hits: Hits, paints: FullPaints, worker: int) -> np.ndarray:
@@ -287,13 +288,10 @@ def open_screen(scene: Scene, raster: Raster, kernels: ModuleType, threads: int 
     with _workspace() as workspace, np.errstate(all="ignore"):
         unit, origin, balls, corners = scene_units(scene)
         order, material = scene.numbered
-        lens, grid = make_lens(raster), eye_grid(raster)
+        lens = make_lens(raster)
         view, boxes = _view(raster, origin, balls, material), _NO_BOXES
         if len(corners):
-            facets = see_facets(grid, view.kappa, origin, corners)
-            view = _with_facets(view, facets, true_zeros(origin, corners, raster.camera), scene.triangles)
-            boxes = facet_boxes(lens, corners - origin)
-            boxes[~facets.faces] = 0
+            view, boxes = _with_facets(view, workspace, kernels, lens, raster, origin, corners, scene.triangles)
         bins, slow_ids = _sort(workspace, kernels, lens, view, len(scene.spheres), boxes, threads)
         slow, targets = _slow(lens, view, origin, balls, slow_ids, kernels)
         targets = targets._replace(corners=corners, order=order)
@@ -328,9 +326,9 @@ def make_full_paints(plan: Plan, screen: Screen) -> FullPaints:
     )
     lights = tuple(light.position for light in plan.lights) if terms.shadows else ()
     return FullPaints(
-        paints.background, scene.background, paints.lights, surfaces_of(scene).reshape(-1),
+        paints.background, scene.background, paints.lights, surfaces_of(scene.materials).reshape(-1),
         corners_of(screen.origin, corners).reshape(-1), *light_cells(*shapes, screen.unit, lights, screen.kernels),
-        resolution_for(len(screen.targets.balls) + len(corners)), tree_of(*shapes, screen.unit, screen.kernels),
+        resolution_for(len(scene)), tree_of(*shapes, screen.unit, screen.kernels),
         terms.bits, terms.specular, terms.shadows, terms.mirrors,
     )  # fmt: skip
 
@@ -386,19 +384,26 @@ def _view(raster: Raster, origin: np.ndarray, balls: np.ndarray, material: np.nd
     )  # fmt: skip
 
 
-def _with_facets(view: View, facets: Facets, zeros: np.ndarray, triangles: Triangles) -> View:
-    """The view with triangles as well.
-
-    FACET numbers each: 12 of `Facets.rows`, `distance`, 3 of `true_zeros`, 3 of `Triangles.corner_numbers`, and some
-    to spare.
-    """
-    table = np.concatenate([view.balls, facets.planes.reshape(-1)])
+def _with_facets(
+    view: View, workspace: Workspace, kernels: ModuleType, lens: Lens, raster: Raster, origin: np.ndarray,
+    corners: np.ndarray, triangles: Triangles,
+) -> tuple[View, np.ndarray]:  # fmt: skip
+    """The view with triangles as well, and their boxes, int32 (n, 4): empty for those whose plane holds the eye."""
+    count, back = len(corners), view.back
+    table = workspace.array(len(view.balls) + 4 * count, np.float64, "table")
+    facets = workspace.array(FACET * count, np.float64, "facets")
+    boxes = workspace.array(4 * count, np.int32, "facet boxes")
+    table[: len(view.balls)] = view.balls
+    frame, volumes = (view.u, view.v, (-back[0], -back[1], -back[2]), raster.camera.w), np.full(count, np.nan)
+    while kernels.see_facets(
+        lens, frame, view.reach, view.kappa, view.eye, corners, triangles.corner_numbers, volumes, facets,
+        table[len(view.balls) :], boxes,
+    ):  # fmt: skip
+        for i in np.flatnonzero(np.isnan(volumes)):
+            volumes[i] = exact_volume(origin, corners[i])
+    table = table.view()
     table.flags.writeable = False  # to the kernels, arrays that can be written to are others
-    rows = np.zeros((len(facets.rows), FACET))
-    rows[:, :12], rows[:, 12], rows[:, 13:16], rows[:, 16:19] = (
-        facets.rows, facets.distance, zeros, triangles.corner_numbers,
-    )  # fmt: skip
-    return view._replace(balls=table, facets=rows.reshape(-1))
+    return view._replace(balls=table, facets=facets), boxes.reshape(-1, 4)
 
 
 def _sort(

@@ -25,7 +25,7 @@ def scene_units(scene: Scene) -> tuple[int, np.ndarray, np.ndarray, np.ndarray]:
     if _is_usual(largest):
         return 0, origin, spheres.balls, triangles.vertices
     unit, (origin, balls, corners) = _scaled(largest, origin, spheres.balls, triangles.vertices)
-    balls.flags.writeable = False  # to the kernels, arrays that can be written to are others
+    balls.flags.writeable = corners.flags.writeable = False  # to the kernels, arrays that can be written to are others
     return unit, origin, balls, corners
 
 

@@ -5,6 +5,7 @@ from raytracer.kernels.compiler import cache_named_after_sources
 with cache_named_after_sources():
     from raytracer.kernels.bounds import TILE_HEIGHT, TILE_WIDTH, begin, bound, count, fill
     from raytracer.kernels.bvh import along_curve, build, candidates_in_tree, enclose, nearest_in_tree
+    from raytracer.kernels.facets import see_facets
     from raytracer.kernels.full import radiance_of, sort_into_cells
     from raytracer.kernels.reading import read_plain
     from raytracer.kernels.tiles import (
@@ -54,6 +55,7 @@ __all__ = [
     "range_of",
     "read_plain",
     "refine_given",
+    "see_facets",
     "sort_into_cells",
     "usual_eye",
     "usual_given",

@@ -19,7 +19,7 @@ import numba
 from llvmlite.binding import get_host_cpu_features
 from numba.extending import overload, register_jitable
 
-from raytracer import bounce, boxes, certified, machine_code, methods, shading, twofold
+from raytracer import bounce, boxes, certified, facets, machine_code, methods, shading, twofold
 from raytracer.kernels.lanes import Mask, blend, fused
 
 
@@ -59,7 +59,7 @@ def _compile_calls_into(module: ModuleType) -> None:
             register_jitable(function)
 
 
-_SOURCES = (twofold, certified, boxes, shading, bounce, methods)
+_SOURCES = (twofold, certified, boxes, facets, shading, bounce, methods)
 _OVERLOADED = (twofold.select, twofold.exponent, twofold.scale)
 if get_host_cpu_features().get("fma"):
     _OVERLOADED += (twofold.two_product,)

@@ -14,6 +14,7 @@ from raytracer.arrays import CORNERS
 from raytracer.bounce import (
     MOST_REFLECTIONS,
     away_from,
+    blocks_own,
     blocks_sphere,
     hits_sphere,
     land_again,
@@ -27,15 +28,18 @@ from raytracer.certified import inner
 from raytracer.kernels.compiler import borrowing, compiled, inlined
 from raytracer.kernels.lanes import (
     WIDTH,
+    all_of,
     any_of,
     at_least,
     equal_to,
+    first_of,
     first_where,
     gather,
     gather_rows,
     is_hit,
     load,
     raised,
+    same,
     smallest_of,
     spread,
     store,
@@ -55,7 +59,7 @@ def radiance(view, paints, t, d, where, scratch):
     background = paints.behind
     for bounce in range(MOST_REFLECTIONS + 1):
         material, shown = spread(np.int32(3)) * gather(view.material, where), weight > 0.0
-        ambient = gather_rows(paints.surfaces, material + spread(np.int32(1)))
+        ambient = rows_at(paints.surfaces, material + spread(np.int32(1)))
         light = _light(view, paints, p, n, radius, d, where, shown, material)
         red = red + select(shown, weight * (ambient[0] + light[0]), 0.0)
         green = green + select(shown, weight * (ambient[1] + light[1]), 0.0)
@@ -82,16 +86,20 @@ def radiance(view, paints, t, d, where, scratch):
 def _light(view, paints, p, n, radius, d, where, shown, material):
     """What all lights add, where it is shown."""
     red, green, blue, spark, lights = spread(0.0), spread(0.0), spread(0.0), spread(0.0), paints.lights
-    dr, dg, db, power = gather_rows(paints.surfaces, material)
-    sr, sg, sb, _ = gather_rows(paints.surfaces, material + spread(np.int32(2)))
-    size, unit = size_of(p), unit_of(d)
+    dr, dg, db, power = rows_at(paints.surfaces, material)
+    sr, sg, sb, _ = rows_at(paints.surfaces, material + spread(np.int32(2)))
+    size, unit, shiny = size_of(p), d, ~((sr == 0.0) & (sg == 0.0) & (sb == 0.0))
+    sparkles = paints.specular and any_of(shiny)
+    if sparkles:
+        unit = unit_of(d)
     for i in range(np.uint64(len(lights))):
         light = lights[i, 0], lights[i, 1], lights[i, 2]
         facing, square = towards(p, n, light)
         shine = cosine(facing, square, radius)
-        if paints.specular:
+        if sparkles:
             spark = highlight(p, n, radius, light, square, unit)
             spark = raised_to_whole(spark, power, paints.bits) if paints.bits >= 0 else raised(spark, power)
+            spark = select(shiny, spark, 0.0)
         lit = shown & ((shine > 0.0) | (spark > 0.0))
         if paints.shadows and any_of(lit):
             lit = lit & ~_blocked(view, paints, i, p, light, square, where, size, lit)
@@ -115,7 +123,13 @@ def _blocked(view, paints, i, p, light, a, where, size, asked):
         for place in range(start, stop):
             if not any_of(group & ~blocked):
                 break
-            blocked = blocked | (group & _blocks(view, paints, paints.ids[place], p, d, a, 1.0 / a, where, size))
+            j = paints.ids[place]
+            own = equal_to(where, np.int64(j))
+            if not all_of(own | ~group):
+                blocked = blocked | (group & _blocks(view, paints, j, p, d, a, 1.0 / a, own, size))
+            elif j < view.first_facet:
+                o = away_from(_row(view.balls, np.uint64(4) * np.uint64(j)), p, view.eye)
+                blocked = blocked | (group & blocks_own(o, d, a))
         left = left & ~group
     return blocked & asked
 
@@ -137,9 +151,9 @@ def _cell(resolution, d):
 
 
 @inlined
-def _blocks(view, paints, j, p, d, a, over_a, where, size):
+def _blocks(view, paints, j, p, d, a, over_a, own, size):
     """Whether shape j stands between P and P + D."""
-    row, own = _row(view.balls, np.uint64(4) * np.uint64(j)), equal_to(where, np.int64(j))
+    row = _row(view.balls, np.uint64(4) * np.uint64(j))
     if j < view.first_facet:
         return blocks_sphere(away_from(row, p, view.eye), d, a, over_a, row[3], size, own)
     corners, at = paints.corners, np.uint64(CORNERS) * np.uint64(j - view.first_facet)
@@ -163,9 +177,11 @@ def _nearest(view, paints, p, d, where, from_outside, asked, scratch):
     """What rays from P on the shapes at these places hit first."""
     a, index, size = inner(d[0], d[1], d[2], d[0], d[1], d[2]), spread(np.int32(-1)), size_of(p)
     over_a, best = 1.0 / a, select(asked, spread(np.inf), -np.inf)
-    tree, stack, near, top = paints.tree, scratch.stack, scratch.near, 0
-    over_d = 1.0 / d[0], 1.0 / d[1], 1.0 / d[2]
-    top = _push(tree, view.eye, p, over_d, best, tree.depth - 1, 0, stack, near, top)
+    tree, stack, near, top, over_d = paints.tree, scratch.stack, scratch.near, 1, d
+    stack[0], near[0] = 0, 0.0
+    if len(tree.ids) > WIDTH:
+        over_d = 1.0 / d[0], 1.0 / d[1], 1.0 / d[2]
+        top = _push(tree, view.eye, p, over_d, best, tree.depth - 1, 0, stack, near, 0)
     while top > 0:
         top -= 1
         if not any_of(near[top] <= best):
@@ -178,7 +194,10 @@ def _nearest(view, paints, p, d, where, from_outside, asked, scratch):
             j = tree.ids[place]
             if j < 0:
                 break
-            t = _meet(view, paints, j, p, d, a, over_a, where, size, from_outside)
+            own = equal_to(where, np.int64(j))
+            if all_of((own & (from_outside | (j >= view.first_facet))) | ~asked):
+                continue
+            t = _meet(view, paints, j, p, d, a, over_a, own, size, from_outside)
             index, best = select(t < best, spread(j), index), select(t < best, t, best)
     return best, index
 
@@ -210,9 +229,9 @@ def _push(tree, eye, p, over_d, best, level, first, stack, near, top):
 
 
 @inlined
-def _meet(view, paints, j, p, d, a, over_a, where, size, from_outside):
+def _meet(view, paints, j, p, d, a, over_a, own, size, from_outside):
     """Where rays meet shape j, +inf where they do not."""
-    row, own = _row(view.balls, np.uint64(4) * np.uint64(j)), equal_to(where, np.int64(j))
+    row = _row(view.balls, np.uint64(4) * np.uint64(j))
     if j < view.first_facet:
         hit, h, c, disc = hits_sphere(away_from(row, p, view.eye), d, a, over_a, row[3], size, own, from_outside)
         t = spread(np.inf)
@@ -221,10 +240,21 @@ def _meet(view, paints, j, p, d, a, over_a, where, size, from_outside):
         return t
     corners, at = paints.corners, np.uint64(CORNERS) * np.uint64(j - view.first_facet)
     over, under = plane_ahead(p, d, row, corners[at + np.uint64(9)], size, own)
-    ahead = over > 0.0
+    ahead, t = over > 0.0, spread(np.inf)
     if any_of(ahead):
         ahead = ahead & _within(corners, at, p, d)
-    return select(ahead, over / under, np.inf)
+        if any_of(ahead):
+            t = select(ahead, over / under, np.inf)
+    return t
+
+
+@inlined
+def rows_at(table, places):
+    """`gather_rows`, of which all lanes may want the same."""
+    if same(places):
+        x, y, z, w = _row(table, np.uint64(4) * np.uint64(first_of(places)))
+        return spread(x), spread(y), spread(z), spread(w)
+    return gather_rows(table, places)
 
 
 @inlined

@@ -301,7 +301,7 @@ def smallest_of(typing, lanes):
     def lower(context, builder, sig, args):
         kind = ir.FunctionType(_DOUBLE, [args[0].type])
         name = f"llvm.vector.reduce.fmin.v{WIDTH}f64"
-        return builder.call(get_or_insert_function(builder.module, kind, name), args)
+        return builder.call(get_or_insert_function(builder.module, kind, name), args, fastmath=["nnan"])
 
     return types.float64(lanes), lower
 
@@ -509,6 +509,17 @@ def fetch_ahead(typing, array, i):
         return context.get_dummy_value()
 
     return types.void(array, types.uint64), lower
+
+
+@intrinsic
+def take_number(typing, array):
+    """An int64 array's first element, which then is one more: threads that ask at one time get different ones."""
+
+    def lower(context, builder, sig, args):
+        start = context.make_array(sig.args[0])(context, builder, args[0]).data
+        return builder.atomic_rmw("add", start, ir.Constant(ir.IntType(64), 1), "monotonic")
+
+    return types.int64(array), lower
 
 
 # ------------------------------------------------------------------------------------------------------- pixels

@@ -27,17 +27,19 @@ from raytracer.kernels.lanes import (
     same,
     spread,
     store,
+    take_number,
 )
 from raytracer.kernels.visibility import STRIDE, list_doubts, see_tile, see_tile_unchecked
 from raytracer.shading import cosine, land, land_on_any, to_byte, towards
 from raytracer.twofold import select
 
 
-def _paint(view, slow, bins, first, last, scratch, doubts, paints, out):
-    """Paint tiles from first on, before last; returns the first that was not, for want of room for doubts."""
-    for number in range(first, last):
-        if len(doubts) - doubts[0] <= TILE_WIDTH * TILE_HEIGHT:
-            return number
+def _paint(view, slow, bins, tiles, scratch, doubts, paints, out):
+    """Paint tiles, as long as there are any and there is room for doubts; returns whether all are done, or taken."""
+    while len(doubts) - doubts[0] > TILE_WIDTH * TILE_HEIGHT:
+        number = take_number(tiles.next)
+        if number >= tiles.last:
+            return True
         tile = _tile(view, bins, number)
         if len(slow.ids) == 0 and bins.starts[number] == bins.starts[number + 1]:
             fill_tile(scratch, tile, paints, out)
@@ -45,7 +47,7 @@ def _paint(view, slow, bins, first, last, scratch, doubts, paints, out):
         if see(view, slow, bins, tile, scratch):
             list_doubts(view, tile, scratch, doubts)
         paint_tile(view, scratch, tile, paints, out)
-    return last
+    return False
 
 
 @inlined
