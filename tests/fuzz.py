@@ -1,4 +1,7 @@
-"""Fuzzing by the million: `python tests/fuzz.py interpreter --inputs 10000000`; `--help` says what else.
+"""Fuzzing by the million.
+
+    python tests/fuzz.py interpreter --inputs 10000000
+    python tests/fuzz.py renders --scenes 10000
 
 The same inputs, fewer of them, are a part of the tests (test_fuzz.py).
 """
@@ -8,13 +11,13 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from random import Random
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
 import fuzz_interpreter
+import fuzz_renders
 from tqdm import tqdm
 
 _A_ROUND = 10_000  # examples of hypothesis, which remembers all that it has tried
@@ -78,6 +81,24 @@ def by_atheris(inputs: int, seed: int) -> int:
     return 0
 
 
+def by_rendering(scenes: int, seed: int) -> int:
+    """Scenes number 0, 1, 2, … of this seed, each drawn in every way."""
+    failures = drawn = 0
+    for number in tqdm(range(scenes), mininterval=5):
+        random = Random(f"{seed}/{number}")
+        text = fuzz_renders.scene_of(random)
+        scene = fuzz_renders.read(text)
+        if scene is not None:
+            drawn += 1
+            try:
+                fuzz_renders.check(scene, random)
+            except Exception as error:
+                failures += 1
+                print(f"scene {number}: {type(error).__name__}: {error}\n{text}", flush=True)
+    print(f"{scenes} scenes, {drawn} of them valid, seed {seed}: {failures} failures")
+    return int(failures > 0)
+
+
 ENGINES: dict[str, Callable[[int, int], int]] = {
     "random": by_random,
     "hypothesis": by_hypothesis,
@@ -87,13 +108,18 @@ ENGINES: dict[str, Callable[[int, int], int]] = {
 
 def main() -> int:
     """The exit status is 0 if nothing was found."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     targets = parser.add_subparsers(required=True, metavar="TARGET")
     texts = targets.add_parser("interpreter", help="scene files, right and wrong, for the interpreter")
     texts.add_argument("--inputs", type=int, default=100_000, metavar="N", help="how many, default 100000")
-    texts.add_argument("--engine", choices=ENGINES, default="random", help="who makes them; atheris: pip install atheris")
+    texts.add_argument(
+        "--engine", choices=ENGINES, default="random", help="who makes them; atheris: pip install atheris"
+    )
     texts.set_defaults(run=lambda given: ENGINES[given.engine](given.inputs, given.seed))
-    for target in (texts,):
+    scenes = targets.add_parser("renders", help="valid scenes with extreme numbers, for everything that draws")
+    scenes.add_argument("--scenes", type=int, default=1000, metavar="N", help="how many, default 1000")
+    scenes.set_defaults(run=lambda given: by_rendering(given.scenes, given.seed))
+    for target in (texts, scenes):
         target.add_argument("--seed", type=int, default=1, metavar="S", help="of what is random, default 1")
     given = parser.parse_args()
     return int(given.run(given))
