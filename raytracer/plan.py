@@ -91,6 +91,7 @@ class Plan:
         return not max(far, default=0.0) < 2.0**LIGHT_RANGE
 
     @property
+    @np.errstate(all="ignore")
     def _has_squares(self) -> bool:
         """Whether float64 holds the squares of all lengths that light meets, so that boxes of shapes can be trusted."""
         scene, camera = self.scene, self.scene.camera
