@@ -9,12 +9,14 @@ from random import Random
 
 import fuzz_interpreter
 import fuzz_renders
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, note, settings
 from hypothesis import strategies as st
 
-from raytracer import SceneError, backend
+from raytracer import SceneError, backend, make_plan, plain
 from raytracer.interpreter import interpret
+from raytracer.render import draw
 
 FUZZ = Path(__file__).parent / "fuzz.py"
 both_paths = pytest.mark.skipif(backend.why_no_compiler() != "", reason="numba is not installed")
@@ -48,6 +50,25 @@ def test_only_scene_errors_come_out_of_what_hypothesis_chooses(random):
 @pytest.mark.parametrize("word", [b"18446744073709551616", b"36893488147419103232", b"184467440737095516160"])
 def test_a_number_that_becomes_0_in_64_bits_is_read(word):
     fuzz_interpreter.check(SURFACE + b"sphere 1 2 3 " + word + b"\n")
+
+
+@pytest.mark.parametrize("text", [b"\r#\n", b"\r# sphere 1 2 3 4\n", b"sphere 1 2 3 4\r#\n", b"sphere 1 2 3 4 #\r\n"])
+@both_paths
+def test_a_return_before_a_comment_is_no_end_of_a_line(text):
+    fuzz_interpreter.check(SURFACE + text)
+
+
+@both_paths
+def test_of_equally_near_shapes_in_a_mirror_both_paths_show_the_same():
+    """Three triangles in one place, in a mirror: which is seen must not depend on the tree."""
+    corners = "begin\nvertex -1 -2 -1\nvertex 2 2 -2\nvertex 1 -1 1\nend\n"
+    balls = "".join(f"sphere {r} {x} {y} -3\n" for r, x, y in ((1, 1, -1), (1.5, -1, 1), (0.5, -2, -2)))
+    colours = ("1 0 0", "0 1 0", "0 0 1")
+    text = "fov 60\nlight 3 1 5 1 1 1\nsurface .3 .3 .3 0 0 0 0 0 0 1 1\n" + balls
+    text += "".join(f"surface {c} {c} 0 0 0 1 0\n{corners}" for c in colours)
+    scene = interpret(text + f"surface .2 .2 .2 .9 .9 0 0 0 0 1 0\n{corners}" + balls.replace("-3", "3"))
+    pictures = [draw(make_plan(scene, "full", 40, 30, path=path)) for path in (backend.load(), plain)]
+    np.testing.assert_array_equal(*pictures)
 
 
 @both_paths
