@@ -8,6 +8,13 @@
 The compiler (numba) is loaded when the first picture is drawn, not by this import.
 """
 
+import sys
+
+if sys.argv[:1] == ["-m"]:  # `python -m raytracer`, on its way to `__main__`, which takes over
+    from raytracer.interrupts import end_at_once
+
+    end_at_once()
+
 from raytracer.arrays import Hits
 from raytracer.image import PictureTooLargeError, load_png, save_png
 from raytracer.interpreter import SceneError, interpreter

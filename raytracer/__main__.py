@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import argparse
-import signal
+import os
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from collections.abc import Callable
+from contextlib import closing
 from importlib import resources
 from pathlib import Path
-from threading import Event
-from types import FrameType
 from typing import NamedTuple
 
 import numpy as np
 from tqdm import tqdm
 
-from raytracer import Plan, Scene, SceneError, interpreter, make_plan, probe_pixel, save_png
+from raytracer import Plan, Scene, SceneError, interpreter, interrupts, make_plan, probe_pixel, save_png
 from raytracer.camera import SAMPLINGS
 from raytracer.image import check_can_save
 from raytracer.methods import CERTIFIED, METHODS
@@ -42,7 +40,7 @@ def render(arguments: argparse.Namespace) -> int:
         picture = _by_plug(arguments, plan.scene) if arguments.plug else None
         if picture is None:
             picture = draw_samples(
-                plan, arguments.samples, threads=arguments.threads, progress=show, cancelled=_interrupted.is_set
+                plan, arguments.samples, threads=arguments.threads, progress=show, cancelled=interrupts.came
             )
     save_png(arguments.output, picture)
     return 0
@@ -53,7 +51,7 @@ def _by_plug(arguments: argparse.Namespace, scene: Scene) -> np.ndarray | None:
     width, height = arguments.size
     order = Order(scene, arguments.stage, width, height, arguments.sampling, arguments.method)
     with closing(PlugRunner(arguments.plug, arguments.patience, print)) as runner:
-        picture, names = runner.draw(order, cancelled=_interrupted.is_set)
+        picture, names = runner.draw(order, cancelled=interrupts.came)
     if not names:
         print(f"{arguments.plug}: has no part in stage {arguments.stage}", file=sys.stderr)
     return picture
@@ -130,7 +128,7 @@ def compare(arguments: argparse.Namespace) -> int:
             tolerance=arguments.tolerance,
             allowed=arguments.allow,
             output=arguments.output,
-            cancelled=_interrupted.is_set,
+            cancelled=interrupts.came,
         )
     except (ValueError, OSError, MemoryError) as error:
         print(_one_line(error), file=sys.stderr)
@@ -406,40 +404,45 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def main(words: list[str] | None = None) -> int:
-    """Run one command; the exit status is 0, 1 for bad input, 2 for wrong arguments, 130 when interrupted.
+    """Run one command.
 
+    The exit status is 0, 1 for bad input, 2 for wrong arguments, 130 when interrupted, 141 where nobody reads.
     `compare` has its own: 1 if pictures differ, 2 for bad input.
     """
-    arguments = _parser().parse_args(words)
-    with _noting_interrupts():
-        try:
-            status = int(arguments.function(arguments))
-        except (ValueError, OSError, MemoryError) as error:
-            print(error.report() if isinstance(error, PlugError) else _one_line(error), file=sys.stderr)
-            return 1
-        except BaseException:
-            if not _interrupted.is_set():
-                raise
-    return 130 if _interrupted.is_set() else status
-
-
-_interrupted = Event()
-
-
-@contextmanager
-def _noting_interrupts() -> Iterator[None]:
-    """Remember Ctrl-C: in the middle of compiling its exception may be swallowed, or become another one."""
-
-    def note(number: int, frame: FrameType | None) -> None:
-        _interrupted.set()
-        raise KeyboardInterrupt
-
-    _interrupted.clear()
-    before = signal.signal(signal.SIGINT, note)
+    status = 0
     try:
-        yield
+        with interrupts.noted():
+            status = _run(words)
+    except BaseException:
+        if not interrupts.came():
+            raise
+    return interrupts.status() or status
+
+
+def _run(words: list[str] | None) -> int:
+    try:
+        arguments = _parser().parse_args(words)
+        status = int(arguments.function(arguments))
+        if sys.stdout is not None:
+            sys.stdout.flush()
+        return status
+    except BrokenPipeError:  # `… | head -1` has read enough
+        return 141
+    except (ValueError, OSError, MemoryError) as error:
+        if not interrupts.came():
+            print(error.report() if isinstance(error, PlugError) else _one_line(error), file=sys.stderr)
+        return 1
     finally:
-        signal.signal(signal.SIGINT, before)
+        _give_up_what_cannot_be_printed()
+
+
+def _give_up_what_cannot_be_printed() -> None:
+    """Else Python would try once more at its very end, and say so in its own words."""
+    try:
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _one_line(error: Exception) -> str:

@@ -60,7 +60,8 @@ class Eye(NamedTuple):
             self._add_facets(hits, rows)
             return Hits(hits.t, self._places(hits.index))
         first = self._first(rows)
-        hits = Hits(first.k / squares(rows_of(self.grid, rows)), first.index)
+        t = first.k / squares(rows_of(self.grid, rows))
+        hits = Hits(np.where(first.index >= 0, t, np.inf), first.index)  # inf / inf is no number
         settle(hits, first.unsure, self._pixels_of(rows), self.targets)
         if polished:
             sure = (hits.index >= 0) & ~first.unsure

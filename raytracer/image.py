@@ -5,6 +5,9 @@ from __future__ import annotations
 import errno
 import os
 import secrets
+import time
+from contextlib import suppress
+from glob import escape
 from pathlib import Path
 from typing import IO
 
@@ -13,6 +16,8 @@ import numpy as np
 from raytracer.pool import cores
 
 _BYTES_A_PIXEL = 24  # the picture, the hits of all pixels, and room for a PNG encoder
+_STALE = 3600.0  # seconds that nobody writes to a draft whose writer is alive
+_NAMED = 100  # characters of the file's name that its draft bears: all of them could be too many
 _BYTES_AT_WORK = 200  # for each pixel that a thread is at work on
 
 
@@ -72,7 +77,8 @@ def save_png(path: str | os.PathLike[str], picture: np.ndarray) -> None:
 
 
 def _replace(path: Path, picture: np.ndarray) -> None:
-    draft = path.with_name(f".{secrets.token_hex(8)}.part")
+    _sweep(path)
+    draft = path.with_name(f".{path.name[:_NAMED]}.{secrets.token_hex(8)}.part")
     try:
         with draft.open("xb") as file:
             _encode(picture, file)
@@ -81,6 +87,14 @@ def _replace(path: Path, picture: np.ndarray) -> None:
         draft.replace(path)
     finally:
         draft.unlink(missing_ok=True)
+
+
+def _sweep(path: Path) -> None:
+    """Remove drafts of this file that were left behind: nobody has written to them for an hour."""
+    for draft in path.parent.glob(f".{escape(path.name[:_NAMED])}.{'[0-9a-f]' * 16}.part"):
+        with suppress(OSError):
+            if draft.stat().st_mtime < time.time() - _STALE:
+                draft.unlink()
 
 
 def _encode(picture: np.ndarray, file: IO[bytes]) -> None:

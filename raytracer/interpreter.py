@@ -12,8 +12,10 @@ which knows all the messages.
 
 from __future__ import annotations
 
+import errno
 import os
 import re
+import stat
 from array import array
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
@@ -32,6 +34,8 @@ from raytracer.scene import Camera, Colour, Light, Materials, Scene, Spheres, Tr
 LONGEST_LINE = 1 << 16  # bytes; so a file that is one endless line is refused before it fills the memory
 BLOCK = 3 << 14  # bytes read at once: with its last line completed mostly still less than the longest line
 _MANY_BLOCKS = 160  # after which a file is so large that loading the compiler pays, to read it and to draw it
+MOST_LIGHTS = 1 << 16  # each is some objects, and is looked at from every point of the picture
+_BYTES_A_BYTE = 6  # of memory, that reading a byte of a file takes at most: measured, of spheres of one digit a number
 SMALLEST_FOV = 6.374367059867598e-307  # degrees; below it 1/tan(fov/2) is more than a float64 can hold
 
 
@@ -50,10 +54,11 @@ def interpreter(path: str | os.PathLike[str]) -> Scene:
     """
     path = Path(path)
     try:
-        file = path.open("rb")
+        file = _open(path)
     except (OSError, ValueError) as error:  # ValueError: no file can have this name, as with a NUL in it
         raise _unreadable(path, error) from error
     with file:
+        _check_fits_memory(os.fstat(file.fileno()).st_size, path)
         return _interpret(file, path)
 
 
@@ -197,6 +202,8 @@ def _uvw(draft: _Draft, *numbers: float) -> None:
 
 
 def _light(draft: _Draft, x: float, y: float, z: float, r: float, g: float, b: float) -> None:
+    if len(draft.lights) == MOST_LIGHTS:
+        raise _Fault(f"{MOST_LIGHTS} at most", found="one more 'light'")
     draft.lights.append(Light((x, y, z), (r, g, b)))
 
 
@@ -297,6 +304,30 @@ def _blocks(file: BinaryIO, path: Path) -> Iterator[bytes]:
             mark = b""
     except OSError as error:
         raise _unreadable(path, error) from error
+
+
+def _open(path: Path) -> BinaryIO:
+    """Open a file, and nothing else that may have its name: a pipe would keep us waiting, a device has no end."""
+    descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_BINARY", 0) | getattr(os, "O_NONBLOCK", 0))
+    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+        os.close(descriptor)
+        raise OSError(errno.EINVAL, "not a file but a folder, a pipe or a device")
+    return os.fdopen(descriptor, "rb")
+
+
+def _check_fits_memory(size: int, path: Path) -> None:
+    """Raises `SceneError` now, with the figures, rather than run out of memory later."""
+    needed = size * _BYTES_A_BYTE
+    if needed < 1 << 28:
+        return
+    import psutil  # slow to load, and rarely needed
+
+    available = psutil.virtual_memory().available
+    if needed > available:
+        found = f"found a file of {size / 1e9:.3g} GB, which takes {needed / 1e9:.3g} GB to read"
+        raise SceneError(
+            path, None, None, f"{found}, expected a smaller one: {available / 1e9:.3g} GB of memory are free"
+        )
 
 
 def _unreadable(path: Path, error: Exception) -> SceneError:
@@ -430,7 +461,7 @@ def _bare_lines(block: bytes) -> bytes | None:
     What a comment says is looked at by whoever knows the messages, unless it is plain text.
     """
     if b"#" in block:
-        if not block.isascii() or b"\0" in block:
+        if not block.isascii() or b"\0" in block or b"\r#" in block:  # which is no end of a line, and would become one
             return None
         block = _COMMENT.sub(b"", block)
     if b"\r" in block or b"\t" in block:

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import hashlib
 import os
+from collections.abc import Iterator
+from contextlib import suppress
 from functools import cache
 from getpass import getuser
 from pathlib import Path
@@ -32,12 +34,16 @@ def folder() -> Path | None:
     kernels = _HERE / "kernels"
     sources = [_HERE / f"{name}.py" for name in _SOURCES] + sorted(kernels.glob("*.py"))
     digest = hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()[:16]
-    places = (
-        kernels / "__pycache__",
-        Path("~/.cache/raytracer").expanduser(),
-        Path(gettempdir()) / f"raytracer-{getuser()}",
-    )
-    return next((place / digest for place in places if _can_write(place / digest)), None)
+    return next((place / digest for place in _places() if _can_write(place / digest)), None)
+
+
+def _places() -> Iterator[Path]:
+    """Where it may be kept, the best place first."""
+    yield _HERE / "kernels" / "__pycache__"
+    with suppress(RuntimeError):  # there is no home
+        yield Path("~/.cache/raytracer").expanduser()
+    with suppress(KeyError, ImportError, OSError):  # nobody knows the user's name
+        yield Path(gettempdir()) / f"raytracer-{getuser()}"
 
 
 def is_kept(kernel: str) -> bool:

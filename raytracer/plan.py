@@ -5,19 +5,24 @@ from __future__ import annotations
 from collections.abc import Iterator, Sized
 from dataclasses import dataclass
 from functools import cached_property
+from math import inf
 from types import ModuleType
+
+import numpy as np
 
 from raytracer import backend, plain
 from raytracer.bounce import MOST_REFLECTIONS
-from raytracer.camera import Raster, make_raster
+from raytracer.camera import Raster, eye_grid, make_raster
 from raytracer.eye import Eye, open_eye
 from raytracer.full import terms_of
 from raytracer.methods import CERTIFIED, Method, row_of
 from raytracer.scene import Light, Scene
 from raytracer.stages import LIGHT_RANGE, STAGES, Stage
+from raytracer.units import scene_units
 
 _REFLECTIONS = 4  # that follow each other where there are mirrors, about
 _TESTS_FOR_ONE = 8  # tests of rays that start on a shape, many together, in the time of one of an eye ray
+_LEAST, _MOST = 1e-70, 1e70  # lengths whose squares, and products of four, are numbers that float64 holds in full
 _TESTS_A_LIGHT = 20  # what shading by a light costs, in tests of a ray against a sphere
 
 
@@ -73,7 +78,8 @@ class Plan:
     @cached_property
     def painter(self) -> str:
         """The kernel that paints the whole stage, or nothing if numpy does."""
-        painter = self.stage.painter if self.on_screen and not self._has_far_lights else ""
+        beyond = self._has_far_lights or (self.stage.throws_on and not self._has_squares)
+        painter = self.stage.painter if self.on_screen and not beyond else ""
         if painter == "paint_diffuse" and len(self.scene.triangles):
             return "paint_diffuse_any"
         return f"{painter}_unchecked" if painter and self.unchecked else painter
@@ -83,6 +89,18 @@ class Plan:
         eye = self.scene.camera.eye
         far = (abs(x - o) for light in self.lights for x, o in zip(light.position, eye, strict=True))
         return not max(far, default=0.0) < 2.0**LIGHT_RANGE
+
+    @property
+    @np.errstate(all="ignore")
+    def _has_squares(self) -> bool:
+        """Whether float64 holds the squares of all lengths that light meets, so that boxes of shapes can be trusted."""
+        scene, camera = self.scene, self.scene.camera
+        points = [camera.eye, *(light.position for light in self.lights)]
+        lengths = [abs(x) for point in points for x in point if x]
+        smallest = min(scene.spheres.smallest, scene.triangles.smallest, *lengths, inf)
+        largest = max(scene.spheres.largest, scene.triangles.largest, *lengths, 0.0)
+        smallest, largest = np.ldexp((smallest, largest), -scene_units(scene)[0]).tolist()
+        return bool(smallest > _LEAST and largest < _MOST and _LEAST < eye_grid(self.raster).reach < _MOST)
 
     @property
     def shading(self) -> float:

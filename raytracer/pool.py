@@ -28,6 +28,12 @@ def _executor() -> ThreadPoolExecutor:
 os.register_at_fork(after_in_child=_executor.cache_clear)  # threads do not survive a fork
 
 
+def _end_threads() -> None:
+    """Let the threads end when they are done; whoever wants some will start new ones."""
+    _executor().shutdown(wait=False)
+    _executor.cache_clear()
+
+
 def share(
     jobs: list[Job],
     work: Callable[[Job, int], Done],
@@ -57,13 +63,17 @@ def share(
         while finished is not None and not results.empty():
             finished(results.get())
 
-    others: list[Future[None]] = [_executor().submit(toil, worker) for worker in range(1, workers)]
+    others: list[Future[None]] = []
     try:
+        others.extend(_executor().submit(toil, worker) for worker in range(1, workers))
         toil(0)
+    except KeyboardInterrupt:
+        failed = True
+        _end_threads()  # one that was just being started would be forgotten, and waited for at the end
+        raise
     finally:
         late = [future for future in others if not future.cancel()]
         errors = [future.exception() for future in late]
     tell()
-    for error in errors:
-        if error is not None:
-            raise error
+    for error in filter(None, errors):
+        raise error

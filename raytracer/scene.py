@@ -167,6 +167,11 @@ class Spheres(_Table[Sphere]):
         """The largest number among centres and radii, without its sign; 0 if there is none."""
         return float(np.abs(self.balls[: len(self)]).max(initial=0.0))
 
+    @cached_property
+    def smallest(self) -> float:
+        """The smallest of them that is not 0; +inf if there is none."""
+        return _smallest(self.balls[: len(self)])
+
     def _row(self, i: int) -> Sphere:
         return Sphere(float(self.radii[i]), vector(self.centres[i]), self.materials[self.material[i]])
 
@@ -200,9 +205,18 @@ class Triangles(_Table[Triangle]):
         """The largest number among the corners, without its sign; 0 if there is none."""
         return float(np.abs(self.vertices).max(initial=0.0))
 
+    @cached_property
+    def smallest(self) -> float:
+        """The smallest of them that is not 0; +inf if there is none."""
+        return _smallest(self.vertices)
+
     def _row(self, i: int) -> Triangle:
         first, second, third = self.vertices[i]
         return Triangle((vector(first), vector(second), vector(third)), self.materials[self.material[i]])
+
+
+def _smallest(numbers: np.ndarray) -> float:
+    return float(np.abs(numbers).min(where=numbers != 0.0, initial=np.inf))
 
 
 @dataclass(frozen=True)

@@ -172,10 +172,13 @@ class Block:
     def paint(
         self, colours: np.ndarray | tuple[float, float, float], elsewhere: tuple[float, float, float]
     ) -> np.ndarray:
-        """Colours (hits, 3), or one for all, where something is hit, and one colour elsewhere: (pixels, 3)."""
+        """Colours (hits, 3), or one for all, where something is hit, and one colour elsewhere: (pixels, 3).
+
+        What is not a number, since it lies beyond float64, is black.
+        """
         picture = np.empty((*self.hit.shape, 3))
         picture[...] = elsewhere
-        picture[self.hit] = colours
+        picture[self.hit] = np.where(np.isnan(colours), 0.0, colours)
         return picture
 
 

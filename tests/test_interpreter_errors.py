@@ -228,7 +228,11 @@ def test_a_file_that_fails_while_it_is_read(tmp_path: Path, monkeypatch: pytest.
         def read(self, size: int | None = -1, /) -> bytes:
             raise UnsupportedOperation("broken\ndisk")
 
-    monkeypatch.setattr(Path, "open", lambda *_: Failing())
+        def fileno(self) -> int:
+            return 0
+
+    monkeypatch.setattr(reader, "_open", lambda _: Failing())
+    monkeypatch.setattr(reader, "_check_fits_memory", lambda *_: None)
     assert r"broken\ndisk" in unreadable(tmp_path).message
 
 

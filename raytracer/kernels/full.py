@@ -198,7 +198,8 @@ def _nearest(view, paints, p, d, where, from_outside, asked, scratch):
             if all_of((own & (from_outside | (j >= view.first_facet))) | ~asked):
                 continue
             t = _meet(view, paints, j, p, d, a, over_a, own, size, from_outside)
-            index, best = select(t < best, spread(j), index), select(t < best, t, best)
+            closer = (t < best) | ((t == best) & at_least(index, j))  # of equally near ones that with the least number
+            index, best = select(closer, spread(j), index), select(closer, t, best)
     return best, index
 
 

@@ -113,7 +113,7 @@ def _number(text, p):
         byte = text[p]
         if _ZERO <= byte <= _NINE:
             whole = whole * np.uint64(10) + np.uint64(byte - _ZERO)
-            digits += 1 if whole > np.uint64(0) else 0
+            digits += 1 if digits > 0 or whole > np.uint64(0) else 0  # even where 2⁶⁴ has become 0
             power -= 1 if fraction else 0
             some = True
         elif byte == _DOT and not fraction:
