@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import secrets
+from collections.abc import Callable
 from pathlib import Path
 from typing import IO
 
@@ -59,23 +60,28 @@ def save_png(path: str | os.PathLike[str], picture: np.ndarray) -> None:
 
     A link is followed, a pipe or device written to as it is. Raises `OSError`.
     """
+    save_whole(path, lambda file: _encode(picture, file))
+
+
+def save_whole(path: str | os.PathLike[str], write: Callable[[IO[bytes]], object]) -> None:
+    """The same for anything that `write` puts into the file that it is given."""
     check_can_save(path)
     path = Path(path).resolve()
     try:
         if path.exists() and not path.is_file():
             with path.open("wb") as file:
-                _encode(picture, file)
+                write(file)
         else:
-            _replace(path, picture)
+            _replace(path, write)
     except OSError as error:
         raise OSError(error.errno, error.strerror, str(path)) from error
 
 
-def _replace(path: Path, picture: np.ndarray) -> None:
+def _replace(path: Path, write: Callable[[IO[bytes]], object]) -> None:
     draft = path.with_name(f".{secrets.token_hex(8)}.part")
     try:
         with draft.open("xb") as file:
-            _encode(picture, file)
+            write(file)
             file.flush()
             os.fsync(file.fileno())
         draft.replace(path)

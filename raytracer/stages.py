@@ -17,6 +17,7 @@ from raytracer.arrays import Hits
 from raytracer.camera import Raster, Vectors, directions, directions_of, eye_grid
 from raytracer.facets import planes_of
 from raytracer.full import World
+from raytracer.image import to_bytes
 from raytracer.scene import Camera, Colour, Light, Scene
 from raytracer.units import scene_units
 
@@ -272,6 +273,13 @@ def error(block: Block) -> np.ndarray:
     picture[hit & ~truly_hit] = FALSE_HIT
     picture[~hit & truly_hit] = FALSE_MISS
     return picture
+
+
+def wrong_pixels(picture: np.ndarray) -> int:
+    """How many pixels of a picture (height, width, 3) at stage `error` have a colour that says wrong."""
+    colours = to_bytes(np.array([WRONG_SHAPE, FALSE_HIT, FALSE_MISS]))
+    same = ([picture[..., k] == byte for k, byte in enumerate(colour)] for colour in colours)
+    return sum(int(np.logical_and.reduce(bands).sum()) for bands in same)
 
 
 def cost(block: Block) -> np.ndarray:
