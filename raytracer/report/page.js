@@ -111,8 +111,11 @@ for (const chart of all(".chart")) {
     marks[(marks.indexOf(event.target) + step + marks.length) % marks.length].focus();
   });
 }
-document.addEventListener("keydown", (event) => { if (event.key === "Escape") tip.hidden = true; });
-document.addEventListener("scroll", () => { if (!document.activeElement.closest?.(".chart")) tip.hidden = true; }, { passive: true });
+function hide() {
+  for (const mark of all(".mark.at")) show(mark.closest(".chart"));
+}
+document.addEventListener("keydown", (event) => { if (event.key === "Escape") hide(); });
+document.addEventListener("scroll", () => { if (!document.activeElement.closest(".chart")) hide(); }, { passive: true });
 
 // Keys of a legend light up what is theirs, in all charts of the group.
 for (const legend of all(".keys")) {

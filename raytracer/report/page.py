@@ -17,7 +17,7 @@ from raytracer.measure import COMPILED, STRESS
 from raytracer.methods import METHODS
 from raytracer.report import plots
 from raytracer.report.figures import Figures, Score, Timing, measure_figures, read_figures
-from raytracer.report.gallery import TILE, Entry, draw_gallery
+from raytracer.report.gallery import TILE, Entry, Tile, draw_gallery
 from raytracer.stages import ERROR_LEGEND, STAGES
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ def page(name: str, entries: list[Entry], figures: Figures, tile: int, seconds: 
         pictures=sum(len(entry.tiles) for entry in entries),
         seconds=[duration_in_words(some) for some in (sum(seconds), *seconds)],
         when=datetime.now().astimezone(),
-        wrong=[(entry, entry.wrong_by_method()) for entry in entries if entry.wrong_by_method()],
+        wrong=wrong_entries(entries),
         legend=[(_css(colour), text) for colour, text in ERROR_LEGEND],
         figures=figures,
         charts=charts(figures),
@@ -89,6 +89,12 @@ def page(name: str, entries: list[Entry], figures: Figures, tile: int, seconds: 
         machine=machine(),
         plots=plots,
     )  # fmt: skip
+
+
+def wrong_entries(entries: Iterable[Entry]) -> list[tuple[Entry, dict[str, Tile]]]:
+    """The scenes in which a method is wrong, with these methods' pictures; those with most wrong pixels first."""
+    some = [(entry, entry.wrong_by_method()) for entry in entries]
+    return sorted((one for one in some if one[1]), key=lambda one: -sum(tile.wrong for tile in one[1].values()))
 
 
 def environment() -> Environment:
@@ -113,13 +119,21 @@ class Chart(NamedTuple):
     chooser: str = ""  # what is chosen
 
 
+class Key(NamedTuple):
+    """What a colour means."""
+
+    name: str
+    colour: str
+    hollow: bool
+
+
 class Group(NamedTuple):
     """Charts beside each other, and what their colours mean."""
 
     title: str
     about: str
     charts: list[Chart]
-    keys: dict[str, str]  # names, and their colours
+    legend: list[Key]
 
 
 def charts(figures: Figures) -> list[Group]:
@@ -167,8 +181,9 @@ def _group(title: str, about: str, panels: list[plots.Panel]) -> Group:
     return Group(title, about, some, _keys(some))
 
 
-def _keys(some: Iterable[Chart]) -> dict[str, str]:
-    return {mark.key: mark.colour for one in some for panel in one.panels for mark in panel.marks}
+def _keys(some: Iterable[Chart]) -> list[Key]:
+    marks = [mark for one in some for panel in one.panels for mark in panel.marks]
+    return list(dict.fromkeys(Key(mark.key, mark.colour, mark.hollow) for mark in marks))
 
 
 def family_table(scores: Iterable[Score]) -> tuple[list[str], dict[str, list[Cell]]]:
@@ -252,15 +267,16 @@ def machine() -> list[tuple[str, str]]:
         ("Machine", chart.machine()),
         ("Memory", memory),
         ("Compiler", f"none: {fault}" if fault else "numba"),
-        *((name, _version(name)) for name in _VERSIONS),
+        *((name, found) for name in _VERSIONS if (found := _version(name))),
     ]
 
 
 def _version(name: str) -> str:
+    """Nothing if it is not installed as a package."""
     try:
         return version(name)
     except PackageNotFoundError:
-        return "not installed as a package"
+        return ""
 
 
 def duration_in_words(seconds: float) -> str:

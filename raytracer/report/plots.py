@@ -24,6 +24,7 @@ from raytracer.samples import ADAPTIVE
 WIDTH, HEIGHT = 520, 380
 LEFT, RIGHT, TOP, BOTTOM = 66, 18, 40, 56
 _SHELF = 26  # the height of the strip for "none"
+_LINE = 18  # the height of a line of words
 _MOST_TICKS = 7
 _ABOVE = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -49,6 +50,7 @@ class Axis:
     shelf: str = ""  # what its tick is called
     label: Callable[[float], str] = short
     fixed: tuple[tuple[float, str], ...] = ()  # ticks to choose from, in place of powers of ten
+    names: bool = False
 
     def at(self, value: float) -> float:
         towards = 1 if self.end > self.start else -1
@@ -78,7 +80,16 @@ class Rows(NamedTuple):
 
     title: str
     ticks: list[tuple[float, str]]
-    shelf: str = ""
+    names: bool = True
+
+
+class Label(NamedTuple):
+    """Words beside a mark."""
+
+    text: str
+    x: float
+    y: float
+    anchor: str  # which end of the words is at x
 
 
 class Mark(NamedTuple):
@@ -93,7 +104,7 @@ class Mark(NamedTuple):
     hollow: bool
     key: str  # those of one name light up together
     sentence: str
-    label: str = ""  # written beside it
+    label: Label | None = None
 
 
 class Line(NamedTuple):
@@ -225,12 +236,21 @@ def _speed_panel(name: str, title: str, costs: list[Cost], unit: str, what: str)
     y = _upwards(f"wrong {what} per million", [1e6 / max((c.cases for c in costs), default=1), 1e6], "none", room=1.6)
     compiled = [cost for cost in costs if cost.backend == COMPILED] or costs
     front = pareto((cost.time, cost.rate) for cost in costs)
-    named = {cost.method for cost in compiled if (cost.time, cost.rate) in front}
-    marks = [_cost_mark(cost, x, y, unit, what, cost in compiled and cost.method in named) for cost in costs]
+    named = _apart([cost for cost in compiled if (cost.time, cost.rate) in front], y)
+    marks = [_cost_mark(cost, x, y, unit, what, cost in named) for cost in costs]
     right = sum(cost.wrong == 0 for cost in compiled)
     cases = max((cost.cases for cost in compiled), default=0)
     verdict = f"{title}: {right} of {len(compiled)} methods are right {cases:,} times of {cases:,}"
     return Panel(name, verdict, x, y, marks, [Line(_steps(front, x, y), "grey", False, "")])
+
+
+def _apart(costs: list[Cost], y: Axis) -> list[Cost]:
+    """Those that are so much better than the one before that there is room to name them."""
+    named: list[Cost] = []
+    for cost in sorted(costs, key=lambda cost: cost.rate):
+        if not named or y.at(named[-1].rate) - y.at(cost.rate) > _LINE:
+            named.append(cost)
+    return named
 
 
 def _steps(front: list[tuple[float, float]], x: Axis, y: Axis) -> str:
@@ -253,8 +273,18 @@ def _cost_mark(cost: Cost, x: Axis, y: Axis, unit: str, what: str, named: bool) 
     sentence = f"{cost.method}, {how}: {figure(cost.time)} {unit} ({spread}); {wrong}"
     shape = "dot" if cost.backend == COMPILED else "square"
     place = x.at(cost.time), y.at(cost.rate), x.at(cost.low), x.at(cost.high)
-    label = cost.method if named else ""
+    label = _below(cost.method, *place[:2]) if named else None
     return Mark(*place, colour_of(cost.method), shape, cost.single, cost.method, sentence, label)
+
+
+def _below(text: str, x: float, y: float) -> Label:
+    """To the left of a mark on the Pareto line and below it, where there is no other; on the shelf, above it."""
+    height = y - 12 if y > HEIGHT - BOTTOM - _SHELF else y + 20
+    return Label(text, x - 8, height, "end") if x > LEFT + 13 * len(text) else Label(text, x - 4, height, "start")
+
+
+def _above(text: str, x: float, y: float) -> Label:
+    return Label(text, x, y - 12, "end" if x > WIDTH - RIGHT - 12 * len(text) else "start")
 
 
 # ------------------------------------------------------------------------------------------------ the error of t
@@ -287,7 +317,7 @@ def _error_panel(place: str, own: list[Score]) -> Panel:
         hollow, colour = s.precision == "float32", colour_of(s.method)
         marks.append(Mark(low, y, low, worst, colour, "dot", hollow, s.method, sentence))
         marks.append(Mark(most, y, most, most, colour, "diamond", hollow, s.method, sentence))
-    return Panel(place, place.capitalize(), x, Rows("", rows), marks, [])
+    return Panel(place, place.capitalize(), x, Rows("● median    ◆ 99.9 %    line: to the worst", rows), marks, [])
 
 
 def _ulps(value: float) -> str:
@@ -351,7 +381,9 @@ def _sample_panel(scene: str, own: list[Sample]) -> Panel:
         left, height = places[s.samples]
         name = s.samples if key == ADAPTIVE else f"{s.samples} sample{'' if s.samples == '1' else 's'} a pixel"
         sentence = f"{name}: {figure(s.milliseconds)} ms; error {figure(s.error)} bytes (RMS)"
-        marks.append(Mark(left, height, left, left, colour_of(key), "dot", False, key, sentence, s.samples))
+        marks.append(
+            Mark(left, height, left, left, colour_of(key), "dot", False, key, sentence, _above(s.samples, left, height))
+        )
     even = [places[s.samples] for s in own if s.samples != ADAPTIVE]
     return Panel(scene, scene, x, y, marks, [Line(_polyline(even), colour_of("even"), False, "even")])
 
@@ -386,6 +418,6 @@ def _bench_panel(section: str, title: str, across: str, own: list[Timing]) -> Pa
             note = ", extrapolated from a smaller picture" if t.extrapolated == "1" else ""
             speed = f"{figure(t.millions_a_second)} million rays a second"
             sentence = f"{name}: {duration(t.median_ms / 1e3)}{note}; {how}; {speed}"
-            last = name if t is some[-1] else ""
+            last = _above(name, left, height) if t is some[-1] else None
             marks.append(Mark(left, height, left, left, colour, "dot", dashed, name, sentence, last))
     return Panel(section, title, x, y, marks, lines)
