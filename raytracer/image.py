@@ -56,15 +56,15 @@ def check_can_save(path: str | os.PathLike[str]) -> None:
 
 
 def save_png(path: str | os.PathLike[str], picture: np.ndarray) -> None:
-    """Write uint8 (height, width, 3) as a PNG, whole or not at all: an existing file stays until the new one stands.
+    """Write uint8 (height, width, 3) as a PNG, whole or not at all (see `save`)."""
+    save(path, lambda file: _encode(picture, file))
+
+
+def save(path: str | os.PathLike[str], write: Callable[[IO[bytes]], object]) -> None:
+    """Write a file, whole or not at all: an existing file stays until the new one stands.
 
     A link is followed, a pipe or device written to as it is. Raises `OSError`.
     """
-    save_whole(path, lambda file: _encode(picture, file))
-
-
-def save_whole(path: str | os.PathLike[str], write: Callable[[IO[bytes]], object]) -> None:
-    """The same for anything that `write` puts into the file that it is given."""
     check_can_save(path)
     path = Path(path).resolve()
     try:

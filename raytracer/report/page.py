@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from raytracer import backend, chart
 from raytracer.bench_chart import duration, figure, unit_of
-from raytracer.image import save_whole
+from raytracer.image import save
 from raytracer.measure import COMPILED, STRESS
 from raytracer.methods import METHODS
 from raytracer.report import plots
@@ -66,7 +66,7 @@ def write_report(
         found = measure_figures(progress)
     progress("writing")
     text = page(folder.resolve().name, entries, found, tile, (drawn - start, perf_counter() - drawn))
-    save_whole(output, lambda file: file.write(text.encode()))
+    save(output, lambda file: file.write(text.encode()))
 
 
 def page(name: str, entries: list[Entry], figures: Figures, tile: int, seconds: tuple[float, float]) -> str:
