@@ -27,7 +27,7 @@ function filter() {
   document.getElementById("count").value = `${shown} of ${pictures} pictures`;
 }
 
-filters.addEventListener("input", filter);
+for (const kind of ["input", "change"]) filters.addEventListener(kind, filter);
 filters.addEventListener("submit", (event) => event.preventDefault());
 filters.addEventListener("reset", (event) => {
   event.preventDefault();
