@@ -17,6 +17,7 @@ from raytracer.arrays import FullPaints, Hits, Paints
 from raytracer.eye import Eye, count_tests
 from raytracer.image import to_bytes
 from raytracer.methods import CERTIFIED, Method
+from raytracer.notebook import Picture
 from raytracer.plan import Plan, make_plan
 from raytracer.pool import share
 from raytracer.scene import Camera, Light, Materials, Scene, Spheres
@@ -61,7 +62,8 @@ def render_scene(
     plan = make_plan(scene, stage, width, height, sampling, method)
     from raytracer.samples import draw_samples  # which draws by what is below
 
-    return draw_samples(plan, samples, threads=threads, out=out, progress=progress, cancelled=cancelled)
+    picture = draw_samples(plan, samples, threads=threads, out=out, progress=progress, cancelled=cancelled)
+    return picture.view(Picture) if out is None else picture
 
 
 def draw(

@@ -15,6 +15,7 @@ from typing import TypeVar, overload
 import numpy as np
 
 from raytracer.arrays import aligned
+from raytracer.notebook import counted, scene_as_html
 
 Vector = tuple[float, float, float]
 Colour = tuple[float, float, float]
@@ -205,7 +206,7 @@ class Triangles(_Table[Triangle]):
         return Triangle((vector(first), vector(second), vector(third)), self.materials[self.material[i]])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Scene:
     """Everything a `.cli` file says. Two scenes are equal when they say the same, wherever they were read from."""
 
@@ -220,6 +221,14 @@ class Scene:
     def __len__(self) -> int:
         """The number of shapes, of all kinds."""
         return len(self.spheres) + len(self.triangles)
+
+    def __repr__(self) -> str:
+        name = f" {self.path.name!r}" if self.path else ""
+        tables = ((self.spheres, "sphere"), (self.triangles, "triangle"), (self.lights, "light"))
+        return f"<Scene{name}: {', '.join(counted(len(table), word) for table, word in tables if table) or 'empty'}>"
+
+    def _repr_html_(self) -> str:
+        return scene_as_html(self)
 
     @cached_property
     def numbered(self) -> tuple[np.ndarray, np.ndarray]:
