@@ -18,7 +18,7 @@ _BYTES_AT_WORK = 200  # for each pixel that a thread is at work on
 
 
 class PictureTooLargeError(MemoryError):
-    """A picture that this machine's memory does not hold."""
+    """A picture that this machine's memory does not hold; the text says what it takes and what is free."""
 
 
 def check_fits_memory(width: int, height: int, at_work: int) -> None:
@@ -56,7 +56,10 @@ def check_can_save(path: str | os.PathLike[str]) -> None:
 
 
 def save_png(path: str | os.PathLike[str], picture: np.ndarray) -> None:
-    """Write uint8 (height, width, 3) as a PNG, whole or not at all (see `save`)."""
+    """Write uint8 (height, width, 3) as a PNG, whole or not at all: an existing file stays until the new one stands.
+
+    Raises `OSError`.
+    """
     save(path, lambda file: _encode(picture, file))
 
 
@@ -96,7 +99,7 @@ def _encode(picture: np.ndarray, file: IO[bytes]) -> None:
 
 
 def load_png(path: str | os.PathLike[str]) -> np.ndarray:
-    """A picture file as uint8 (height, width, 3)."""
+    """A picture file as uint8 (height, width, 3), red, green, blue, the top row first. Raises `OSError`."""
     from PIL import Image
 
     with Image.open(path) as image:

@@ -51,6 +51,8 @@ def render_scene(
 ) -> np.ndarray:
     """The picture of a scene at a stage: uint8 (height, width, 3), red, green, blue, the top row first.
 
+    In a notebook it is shown as a picture (see `raytracer.notebook`).
+
     `samples` is how many rays a pixel has: 1, 4, 16, 64 or 256, or "adaptive", more of them only where neighbours
     differ (see `raytracer.samples`).
 
@@ -285,6 +287,8 @@ def eye_hits(
     threads: int | None = None,
 ) -> Hits:
     """What each pixel's eye ray hits first: t (float64, +inf for a miss) and index (int32, −1), both (height, width).
+
+    ValueError for a size, sampling or method that there is not, `PictureTooLargeError` before a ray is shot.
 
     index is the shape's place among all shapes of the file; `scene.shape(index)` is the shape. t counts multiples of
     the ray's direction, which is not normalised.

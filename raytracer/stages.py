@@ -32,7 +32,9 @@ Scale = tuple[tuple[float, Colour], ...]  # numbers, ascending, and the colours 
 class Block:
     """The hits of some pixels, and what can be asked about them. Computed when asked for, and once.
 
-    The pixels are some rows of the picture or a list of them; `hits`, `truth` and `tests` are of their shape.
+    The pixels are some rows of the picture or a list of them; `hits`, `truth` and `tests` are of their shape. What is
+    said of hits (`points`, `normals`, `diffuse`) has a row for each pixel that is hit, in order: float64 (hits, 3).
+    `paint` puts colours back where they belong. Lengths are in the scene's unit, normals and directions of length 1.
     """
 
     scene: Scene
@@ -330,6 +332,7 @@ TESTS_LEGEND = (
 
 
 def background(scene: Scene) -> tuple[Colour, Colour]:
+    """The one colour of hits, where a kernel paints them alike, and that of the rest."""
     return BLACK, scene.background
 
 
@@ -339,7 +342,11 @@ def black(scene: Scene) -> tuple[Colour, Colour]:
 
 @dataclass(frozen=True)
 class Stage:
-    """One row of `STAGES`."""
+    """One row of `STAGES`: its key in the window, its function from a `Block` to colours, and what it needs.
+
+    The function returns float64 (rows, width, 3), 0 for black and 1 for full. What it does not ask for
+    (`needs_normals`, `needs_lights`, …) is not computed.
+    """
 
     key: str  # in the window
     colours: Callable[[Block], np.ndarray]

@@ -36,6 +36,7 @@ NOTHING = Figures([], [], [], [])
 def in_numpy(monkeypatch):
     """The bits are the same, and no method's kernel has to be compiled."""
     monkeypatch.setattr(backend, "_loaded", plain)
+    monkeypatch.setattr(bench, "compile_all", lambda: None)
 
 
 @pytest.fixture
@@ -122,6 +123,19 @@ def test_measured_figures_are_read_back_as_the_tables_say(monkeypatch):
     assert {t.section for t in found.timings} >= {"spheres", "pixels", "threads", "stages", "methods"}
     assert {s.samples for s in found.samples} == {"1", "4", "16", "64", "adaptive"}
     assert {c.fault for c in found.contacts} == {"self-hit", "missed"}
+
+
+def test_where_the_projects_scenes_are_not_there_their_charts_are_left_out(tmp_path, monkeypatch):
+    monkeypatch.setattr(measure, "SCENES", tmp_path)
+    monkeypatch.setattr("raytracer.report.figures._BENCH_PARTS", ())
+    effort = measure.Effort(
+        rays=64, rounds=1, timed_rays=64, methods=("certified",), families=("ground",), backends=("numpy",),
+        scenes=(tmp_path / "none.cli",),
+    )  # fmt: skip
+    found = measure_figures(effort=effort, contact_rays=60)
+    assert not found.samples
+    assert {s.kind for s in found.scores} == {"family"}
+    assert not any(chart.panels for group in page.charts(found) for chart in group.charts if chart.name == "scenes")
 
 
 def test_the_tables_in_docs_can_be_read():

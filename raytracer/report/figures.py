@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple, TypeVar, get_type_hints
@@ -145,7 +145,11 @@ def measure_figures(
     bench_effort: bench.Effort = _BENCH,
     contact_rays: int = _CONTACTS,
 ) -> Figures:
-    """Measure what `chart` and `bench` measure, in less than a minute: fewer rays, rounds and spheres."""
+    """Measure what `chart` and `bench` measure, in less than a minute: fewer rays, rounds and spheres.
+
+    Pictures are measured of the project's own scenes, so far as they are there.
+    """
+    effort = replace(effort, scenes=tuple(path for path in effort.scenes if path.is_file()))
     with TemporaryDirectory() as name:
         folder = Path(name)
         scores, frames = measure.score_families(effort, progress), measure.score_scenes(effort, progress)
@@ -154,10 +158,10 @@ def measure_figures(
         counts = contacts.false_self_hits(contact_rays), contacts.missed_contacts(contact_rays)
         chart_contacts.write_table(folder / "chart-contacts.csv", *counts)
         samples = {}
-        for scene in chart_samples.SHOWN:
-            progress(f"samples a pixel, {scene}")
-            path = measure.SCENES / f"{scene}.cli"
-            samples[scene] = chart_samples.measure_samples(path, _SAMPLES_SIZE, _SAMPLES_ROUNDS)
+        for path in (measure.SCENES / f"{name}.cli" for name in chart_samples.SHOWN):
+            if path.is_file():
+                progress(f"samples a pixel, {path.stem}")
+                samples[path.stem] = chart_samples.measure_samples(path, _SAMPLES_SIZE, _SAMPLES_ROUNDS)
         chart_samples.write_table(folder / "chart-samples.csv", samples)
         report = bench.measure(bench_effort, progress=progress, parts=_BENCH_PARTS)
         bench_chart.write_csv(folder / "bench.csv", report)
