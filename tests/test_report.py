@@ -122,6 +122,9 @@ def test_measured_figures_are_read_back_as_the_tables_say(monkeypatch):
     assert far.time_quarter <= far.time_median <= far.time_three_quarters
     assert {t.section for t in found.timings} >= {"spheres", "pixels", "threads", "stages", "methods"}
     assert {s.samples for s in found.samples} == {"1", "4", "16", "64", "adaptive"}
+    one, many = (next(s for s in found.samples if s.samples == samples) for samples in ("1", "64"))
+    assert many.error < one.error
+    assert many.milliseconds > one.milliseconds > 0
     assert {c.fault for c in found.contacts} == {"self-hit", "missed"}
 
 
@@ -175,6 +178,7 @@ def test_larger_numbers_lie_farther_along_and_nothing_on_the_shelf(values, up, s
     axis = Axis("", low, high, start, end, "none" if shelf else "")
     places = [abs(axis.at(value) - start) for value in sorted(values)]
     assert places == sorted(places)
+    assert axis.at(low) == axis.at(low / 2) != axis.at(high) == axis.at(2 * high) == end
     assert all(0 <= place <= 290 for place in places)
     assert all(axis.at(0) != axis.at(value) for value in values) or not shelf
     assert 1 <= len(axis.ticks) <= 9
