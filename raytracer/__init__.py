@@ -5,6 +5,11 @@
     >>> from raytracer import interpreter, render_scene, save_png
     >>> save_png("sphere.png", render_scene(interpreter("scenes/01_one_sphere.cli")))
 
+* scenes: `interpreter` reads a `.cli` file into a `Scene`, or raises `SceneError`
+* pictures: `render_scene`, at any of `STAGES`, by any of `METHODS`; `save_png`, `load_png`
+* hits: `eye_hits` of a picture's rays, `ray_intersect_scene` of any rays
+* reasons: `make_plan` says what drawing takes and why, `probe_pixel` tells a pixel's story
+
 The compiler (numba) is loaded when the first picture is drawn, not by this import.
 """
 

@@ -185,6 +185,16 @@ def bench(arguments: argparse.Namespace) -> int:
     return int(report.faulty)
 
 
+def report(arguments: argparse.Namespace) -> int:
+    """Write one page about a folder of scenes: pictures, charts, figures, wrong pixels: about two minutes."""
+    from raytracer.report.page import write_report
+
+    check_can_save(arguments.output)
+    with tqdm(bar_format="{desc}", leave=False, disable=None) as line:
+        write_report(arguments.folder, arguments.output, arguments.figures, arguments.tile, line.set_description_str)
+    return 0
+
+
 def _whole(text: str) -> int:
     """ValueError if it is no number of spheres."""
     if not text.isdecimal():
@@ -371,6 +381,42 @@ COMMANDS: dict[str, tuple[Callable[[argparse.Namespace], int], tuple[Argument, .
             ),
         ),
     ),
+    "report": (
+        report,
+        (
+            Argument(
+                ("folder",),
+                {
+                    "metavar": "FOLDER",
+                    "type": Path,
+                    "nargs": "?",
+                    "default": Path("scenes"),
+                    "help": "of scenes, with those in folders within; default scenes",
+                },
+            ),
+            Argument(
+                ("-o", "--output"),
+                {
+                    "metavar": "OUT.html",
+                    "type": Path,
+                    "default": Path("report.html"),
+                    "help": "the file to write, default report.html",
+                },
+            ),
+            Argument(
+                ("--figures",),
+                {
+                    "metavar": "FOLDER",
+                    "type": Path,
+                    "help": "read the tables of chart and bench there, measure nothing",
+                },
+            ),
+            Argument(
+                ("--tile",),
+                {"metavar": "N", "type": count, "default": 160, "help": "pixels along a picture's side, default 160"},
+            ),
+        ),
+    ),
     "verify": (
         verify,
         (
@@ -428,7 +474,7 @@ def _run(words: list[str] | None) -> int:
         return status
     except BrokenPipeError:  # `… | head -1` has read enough
         return 141
-    except (ValueError, OSError, MemoryError) as error:
+    except (ValueError, OSError, MemoryError, ModuleNotFoundError) as error:
         if not interrupts.came():
             print(error.report() if isinstance(error, PlugError) else _one_line(error), file=sys.stderr)
         return 1

@@ -22,7 +22,11 @@ def aligned(size: int, kind: type) -> np.ndarray:
 
 
 class Hits(NamedTuple):
-    """What rays hit first; whoever needs the point, the normal or the material computes it, once, from these two."""
+    """What rays hit first; whoever needs the point, the normal or the material computes it, once, from these two.
+
+    * `t`: float64, +inf for a miss; the hit is at origin + t · direction, in multiples of the direction's length
+    * `index`: int32 of the same shape, the shape's place among all shapes of the file, or of those given; −1 for a miss
+    """
 
     t: np.ndarray  # the hit is at origin + t · direction; +inf for a miss
     index: np.ndarray  # type: ignore[assignment]  # int32, the shape's place among all shapes of the file; −1 for a miss

@@ -500,11 +500,13 @@ PARTS: tuple[Part, ...] = (
 )
 
 
-def measure(effort: Effort, seed: int = 1, progress: Progress = lambda text: None) -> Report:
-    """Measure all parts, one after the other."""
+def measure(
+    effort: Effort, seed: int = 1, progress: Progress = lambda text: None, parts: tuple[Part, ...] = PARTS
+) -> Report:
+    """Measure these parts, one after the other."""
     progress("machine code")
     compile_all()
-    found = [thing for part in PARTS for thing in part(effort, seed, progress)]
+    found = [thing for part in parts for thing in part(effort, seed, progress)]
     sections = tuple(thing for thing in found if isinstance(thing, Section))
     return Report(sections, tuple(thing for thing in found if isinstance(thing, Check)), about_peers(effort))
 

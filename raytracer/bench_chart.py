@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 # Of M. Okabe and K. Ito, as in the other charts; ours is black.
 _COLOURS = ("#d55e00", "#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 _FLUENT = 1 / 60  # seconds of one of sixty pictures a second
-_TIMES = {
+TIMES = {
     **{10.0**power: f"{10 ** (power + 6)} µs" for power in (-5, -4)},
     **{10.0**power: f"{10 ** (power + 3)} ms" for power in (-3, -2, -1)},
     **{10.0**power: f"{10**power} s" for power in (0, 1)},
@@ -36,7 +36,7 @@ def write(folder: Path, report: Report) -> list[Path]:
     folder.mkdir(parents=True, exist_ok=True)
     text, table = folder / "bench.md", folder / "bench.csv"
     text.write_text(as_markdown(report), encoding="utf-8")
-    _write_csv(table, report)
+    write_csv(table, report)
     return [text, table, *draw_chart(folder / "bench", report)]
 
 
@@ -144,7 +144,7 @@ def _line(cells: list[str], widths: list[int]) -> str:
     return f"| {' | '.join(padded)} |"
 
 
-def _write_csv(path: Path, report: Report) -> None:
+def write_csv(path: Path, report: Report) -> None:
     """A row for each figure, times in milliseconds, and for each check."""
     head = (
         "section name spheres width height things median_ms quarter_ms three_quarters_ms first_ms rounds "
@@ -189,7 +189,7 @@ def draw_chart(stem: Path, report: Report) -> list[Path]:
         left.set_xlabel("spheres")
         right.set_xlabel("megapixels")
         low, high = left.get_ylim()
-        left.set_yticks(*zip(*((t, word) for t, word in _TIMES.items() if low <= t <= high), strict=True))
+        left.set_yticks(*zip(*((t, word) for t, word in TIMES.items() if low <= t <= high), strict=True))
         left.minorticks_off()
         head(chart, f"What a picture takes: {_headline(by_spheres)}")
         foot(

@@ -92,7 +92,7 @@ def chart(
     folder.mkdir(parents=True, exist_ok=True)
     scores, frames = score_families(effort, progress), score_scenes(effort, progress)
     progress("drawing")
-    return [_write_table(folder / "chart.csv", scores, frames), *draw_charts(folder, scores, frames)]
+    return [write_table(folder / "chart.csv", scores, frames), *draw_charts(folder, scores, frames)]
 
 
 def draw_charts(folder: Path, scores: list[Score], frames: list[Frame]) -> list[Path]:
@@ -626,7 +626,7 @@ def _some(names: list[str], most: int = 4) -> str:
 # All figures in a table
 
 
-def _write_table(path: Path, scores: list[Score], frames: list[Frame]) -> Path:
+def write_table(path: Path, scores: list[Score], frames: list[Frame]) -> Path:
     """A row for each method, backend and family or scene; the unit of times is a ray and a sphere, or a picture."""
     head = (
         "kind place method precision backend cases wrong wrong_bytes "

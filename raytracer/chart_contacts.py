@@ -5,6 +5,7 @@ The shelf is that of `chart`: "none of N" is no 0, but less than 3 / N with 95 %
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 RAYS = 100_000  # a scale
+SELF_HIT, MISSED = "self-hit", "missed"
 
 _COLOURS = {"none": "#999999", "fixed": "#e69f00", "wächter_binder": "#0072b2", "bounce": "#000000"}
 _MARKERS = {"none": "v", "fixed": "s", "wächter_binder": "D", "bounce": "o"}
@@ -27,10 +29,21 @@ _TOP = 4e6
 
 
 def chart_contacts(folder: Path, progress: Callable[[str], object] = lambda text: None, rays: int = RAYS) -> list[Path]:
-    """Count and draw; write `chart-contacts` as PNG and SVG into the folder; return their paths."""
+    """Count and draw; write `chart-contacts` as CSV, PNG and SVG into the folder; return their paths."""
     folder.mkdir(parents=True, exist_ok=True)
     progress("rays that start on a shape")
-    return draw_contacts(folder, false_self_hits(rays), missed_contacts(rays))
+    counts = false_self_hits(rays), missed_contacts(rays)
+    return [write_table(folder / "chart-contacts.csv", *counts), *draw_contacts(folder, *counts)]
+
+
+def write_table(path: Path, self_hits: list[Count], missed: list[Count]) -> Path:
+    """A row for each way to start a ray and each scale, of either fault."""
+    with path.open("w", encoding="utf-8", newline="") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(["fault", *Count._fields])
+        for fault, counts in ((SELF_HIT, self_hits), (MISSED, missed)):
+            table.writerows([fault, c.offset, f"{c.scale:g}", c.wrong, c.rays] for c in counts)
+    return path
 
 
 def draw_contacts(folder: Path, self_hits: list[Count], missed: list[Count]) -> list[Path]:

@@ -6,6 +6,7 @@ machine disturbs them all, and a time is the median of its rounds.
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Callable
 from pathlib import Path
 from statistics import median
@@ -41,7 +42,7 @@ class Point(NamedTuple):
 def chart_samples(
     folder: Path, progress: Callable[[str], object] = lambda text: None, size: int = SIZE, rounds: int = ROUNDS
 ) -> list[Path]:
-    """Measure and draw; write `chart-samples` as PNG and SVG into the folder; return their paths."""
+    """Measure and draw; write `chart-samples` as CSV, PNG and SVG into the folder; return their paths."""
     from matplotlib import rc_context
 
     folder.mkdir(parents=True, exist_ok=True)
@@ -50,7 +51,17 @@ def chart_samples(
         progress(f"samples a pixel, {name}")
         points[name] = measure_samples(SCENES / f"{name}.cli", size, rounds)
     with rc_context(STYLE):
-        return save(_draw(points, size), folder / "chart-samples")
+        return [write_table(folder / "chart-samples.csv", points), *save(_draw(points, size), folder / "chart-samples")]
+
+
+def write_table(path: Path, points: dict[str, list[Point]]) -> Path:
+    """A row for each scene and number of samples: milliseconds of the picture, its error in bytes (RMS)."""
+    with path.open("w", encoding="utf-8", newline="") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(["scene", "samples", "milliseconds", "error"])
+        for scene, found in points.items():
+            table.writerows([scene, p.samples, f"{1e3 * p.seconds:.4g}", f"{p.error:.4g}"] for p in found)
+    return path
 
 
 def measure_samples(path: Path, size: int, rounds: int) -> list[Point]:

@@ -6,6 +6,7 @@ import errno
 import os
 import secrets
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from glob import escape
 from pathlib import Path
@@ -22,7 +23,7 @@ _BYTES_AT_WORK = 200  # for each pixel that a thread is at work on
 
 
 class PictureTooLargeError(MemoryError):
-    """A picture that this machine's memory does not hold."""
+    """A picture that this machine's memory does not hold; the text says what it takes and what is free."""
 
 
 def check_fits_memory(width: int, height: int, at_work: int) -> None:
@@ -62,6 +63,14 @@ def check_can_save(path: str | os.PathLike[str]) -> None:
 def save_png(path: str | os.PathLike[str], picture: np.ndarray) -> None:
     """Write uint8 (height, width, 3) as a PNG, whole or not at all: an existing file stays until the new one stands.
 
+    Raises `OSError`.
+    """
+    save(path, lambda file: _encode(picture, file))
+
+
+def save(path: str | os.PathLike[str], write: Callable[[IO[bytes]], object]) -> None:
+    """Write a file, whole or not at all: an existing file stays until the new one stands.
+
     A link is followed, a pipe or device written to as it is. Raises `OSError`.
     """
     check_can_save(path)
@@ -69,19 +78,19 @@ def save_png(path: str | os.PathLike[str], picture: np.ndarray) -> None:
     try:
         if path.exists() and not path.is_file():
             with path.open("wb") as file:
-                _encode(picture, file)
+                write(file)
         else:
-            _replace(path, picture)
+            _replace(path, write)
     except OSError as error:
         raise OSError(error.errno, error.strerror, str(path)) from error
 
 
-def _replace(path: Path, picture: np.ndarray) -> None:
+def _replace(path: Path, write: Callable[[IO[bytes]], object]) -> None:
     _sweep(path)
     draft = path.with_name(f".{path.name[:_NAMED]}.{secrets.token_hex(8)}.part")
     try:
         with draft.open("xb") as file:
-            _encode(picture, file)
+            write(file)
             file.flush()
             os.fsync(file.fileno())
         draft.replace(path)
@@ -104,7 +113,7 @@ def _encode(picture: np.ndarray, file: IO[bytes]) -> None:
 
 
 def load_png(path: str | os.PathLike[str]) -> np.ndarray:
-    """A picture file as uint8 (height, width, 3)."""
+    """A picture file as uint8 (height, width, 3), red, green, blue, the top row first. Raises `OSError`."""
     from PIL import Image
 
     with Image.open(path) as image:

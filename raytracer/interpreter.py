@@ -69,6 +69,12 @@ def interpret(source: str | bytes, path: str | os.PathLike[str] = "<text>") -> S
     return _interpret(BytesIO(source), Path(path))
 
 
+def in_order_of_names(path: Path) -> tuple[list[str | int], str]:
+    """What to sort scene files by. Numbers within names count by their value: scene 2 comes before scene 10."""
+    parts = re.split(r"([0-9]+)", path.name.lower())
+    return [int(part) if i % 2 else part for i, part in enumerate(parts)], path.name
+
+
 # ------------------------------------------------------------------------------------------------ the scene so far
 
 

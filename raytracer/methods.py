@@ -198,7 +198,14 @@ class Limits:
 
 @dataclass(frozen=True)
 class Method:
-    """One row of `METHODS`."""
+    """One row of `METHODS`: a way for a ray to meet a sphere.
+
+    * `function`: from origin, direction, centre (three numbers each) and radius to the nearest t > 0, +inf for a miss,
+      in plain arithmetic; None for one with a tracer of its own
+    * `about`, `source`: the formula in a line, and where it is from
+    * `limits`: how far it goes before it is wrong, in powers of ten
+    * `precision`: what it computes in, float64 or float32
+    """
 
     function: Callable[..., Number] | None  # None: it has a tracer of its own
     about: str

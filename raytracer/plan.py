@@ -28,7 +28,10 @@ _TESTS_A_LIGHT = 20  # what shading by a light costs, in tests of a ray against 
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """Everything that is decided before the first ray is shot."""
+    """Everything that is decided before the first ray is shot: who traces, what is shaded, and why.
+
+    `why` has the reasons in sentences, `warnings` those that a person should see unasked; `make_plan` makes one.
+    """
 
     scene: Scene
     name: str  # of the stage

@@ -76,7 +76,11 @@ class Lighting:
 
 @dataclass(frozen=True)
 class Pixel:
-    """What `probe_pixel` found. Of a ray that hits nothing, index is −1 and what belongs to a hit is None."""
+    """What `probe_pixel` found. Of a ray that hits nothing, index is −1 and what belongs to a hit is None.
+
+    `story()` tells it in lines, `lines()` in fewer, `as_pytest()` as a test case. `t` counts multiples of `direction`,
+    `colour` is what the stage computed, `rgb` the bytes that are drawn.
+    """
 
     x: int  # column, from the left
     y: int  # row, from the top
@@ -173,7 +177,10 @@ def probe_pixel(
     sampling: str = "corner",
     method: str = CERTIFIED,
 ) -> Pixel:
-    """The story of the pixel in column x and row y, counted from the top left; ValueError if there is none such."""
+    """The story of the pixel in column x and row y, counted from 0 at the top left, of a picture of width × height.
+
+    ValueError if there is none such, or no such stage, sampling or method.
+    """
     if not (0 <= x < width and 0 <= y < height):
         raise ValueError(f"found pixel {x} {y}, expected one within 0 0 and {width - 1} {height - 1}")
     plan = make_plan(scene, stage, width, height, sampling, method)

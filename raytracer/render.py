@@ -17,6 +17,7 @@ from raytracer.arrays import FullPaints, Hits, Paints, Tiles
 from raytracer.eye import Eye, count_tests
 from raytracer.image import to_bytes
 from raytracer.methods import CERTIFIED, Method
+from raytracer.notebook import Picture
 from raytracer.plan import Plan, make_plan
 from raytracer.pool import share
 from raytracer.scene import Camera, Light, Materials, Scene, Spheres
@@ -48,6 +49,8 @@ def render_scene(
 ) -> np.ndarray:
     """The picture of a scene at a stage: uint8 (height, width, 3), red, green, blue, the top row first.
 
+    In a notebook it is shown as a picture (see `raytracer.notebook`).
+
     `samples` is how many rays a pixel has: 1, 4, 16, 64 or 256, or "adaptive", more of them only where neighbours
     differ (see `raytracer.samples`).
 
@@ -59,7 +62,8 @@ def render_scene(
     plan = make_plan(scene, stage, width, height, sampling, method)
     from raytracer.samples import draw_samples  # which draws by what is below
 
-    return draw_samples(plan, samples, threads=threads, out=out, progress=progress, cancelled=cancelled)
+    picture = draw_samples(plan, samples, threads=threads, out=out, progress=progress, cancelled=cancelled)
+    return picture.view(Picture) if out is None else picture
 
 
 def draw(
@@ -282,6 +286,8 @@ def eye_hits(
     threads: int | None = None,
 ) -> Hits:
     """What each pixel's eye ray hits first: t (float64, +inf for a miss) and index (int32, −1), both (height, width).
+
+    ValueError for a size, sampling or method that there is not, `PictureTooLargeError` before a ray is shot.
 
     index is the shape's place among all shapes of the file; `scene.shape(index)` is the shape. t counts multiples of
     the ray's direction, which is not normalised.

@@ -15,6 +15,7 @@ from typing import TypeVar, overload
 import numpy as np
 
 from raytracer.arrays import aligned
+from raytracer.notebook import counted, scene_as_html
 
 Vector = tuple[float, float, float]
 Colour = tuple[float, float, float]
@@ -22,7 +23,11 @@ Colour = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Camera:
-    """Where the eye is and how it looks: frame u (right), v (up), w (backwards); fov is vertical, in degrees."""
+    """Where the eye is and how it looks: frame u (right), v (up), w (backwards); fov is vertical, in degrees.
+
+    The ray of column x and row y of W × H pixels is eye + t · (U·u + V·v − w / tan(fov / 2)), with U = (2x − W) / H and
+    V = (H − 2y) / H; it goes through the pixel's upper left corner. No vector of the frame need be of length 1.
+    """
 
     eye: Vector = (0.0, 0.0, 0.0)
     u: Vector = (1.0, 0.0, 0.0)
@@ -33,7 +38,7 @@ class Camera:
 
 @dataclass(frozen=True)
 class Light:
-    """A point light; its light does not fade with distance."""
+    """A point light; its light does not fade with distance. A colour is red, green, blue: 1 is full, more may be."""
 
     position: Vector
     colour: Colour
@@ -41,7 +46,12 @@ class Light:
 
 @dataclass(frozen=True)
 class Material:
-    """How a shape answers light: the words of the `surface` command, in its order."""
+    """How a shape answers light: the words of the `surface` command, in its order.
+
+    At stage `full`: ambient + k_refl · (the mirrored ray's colour) + Σ over unshadowed lights of light · (diffuse ·
+    max(0, N·L) + specular · max(0, H·N)^power), with H between L and the direction to the eye (J. Blinn, Models of
+    Light Reflection for Computer Synthesized Pictures, 1977).
+    """
 
     diffuse: Colour = (0.0, 0.0, 0.0)
     ambient: Colour = (0.0, 0.0, 0.0)
@@ -219,9 +229,13 @@ def _smallest(numbers: np.ndarray) -> float:
     return float(np.abs(numbers).min(where=numbers != 0.0, initial=np.inf))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Scene:
-    """Everything a `.cli` file says. Two scenes are equal when they say the same, wherever they were read from."""
+    """Everything a `.cli` file says. Two scenes are equal when they say the same, wherever they were read from.
+
+    `spheres`, `triangles` and `materials` are sequences, held as arrays; `len(scene)` counts all shapes. In a notebook
+    a scene is shown as a table.
+    """
 
     camera: Camera = Camera()
     background: Colour = (0.0, 0.0, 0.0)
@@ -234,6 +248,14 @@ class Scene:
     def __len__(self) -> int:
         """The number of shapes, of all kinds."""
         return len(self.spheres) + len(self.triangles)
+
+    def __repr__(self) -> str:
+        name = f" {self.path.name!r}" if self.path else ""
+        tables = ((self.spheres, "sphere"), (self.triangles, "triangle"), (self.lights, "light"))
+        return f"<Scene{name}: {', '.join(counted(len(table), word) for table, word in tables if table) or 'empty'}>"
+
+    def _repr_html_(self) -> str:
+        return scene_as_html(self)
 
     @cached_property
     def numbered(self) -> tuple[np.ndarray, np.ndarray]:
@@ -252,7 +274,10 @@ class Scene:
         return order, material
 
     def shape(self, index: int) -> Shape:
-        """The shape at this place among all shapes of the file, counted from 0: what `Hits.index` names."""
+        """The shape at this place among all shapes of the file, counted from 0: what `Hits.index` names.
+
+        IndexError if there is none.
+        """
         for table in (self.spheres, self.triangles):
             i = int(np.searchsorted(table.order, index))
             if i < len(table) and table.order[i] == index:

@@ -17,6 +17,7 @@ from raytracer.arrays import Hits
 from raytracer.camera import Raster, Vectors, directions, directions_of, eye_grid
 from raytracer.facets import planes_of
 from raytracer.full import World
+from raytracer.image import to_bytes
 from raytracer.scene import Camera, Colour, Light, Scene
 from raytracer.units import scene_units
 
@@ -31,7 +32,9 @@ Scale = tuple[tuple[float, Colour], ...]  # numbers, ascending, and the colours 
 class Block:
     """The hits of some pixels, and what can be asked about them. Computed when asked for, and once.
 
-    The pixels are some rows of the picture or a list of them; `hits`, `truth` and `tests` are of their shape.
+    The pixels are some rows of the picture or a list of them; `hits`, `truth` and `tests` are of their shape. What is
+    said of hits (`points`, `normals`, `diffuse`) has a row for each pixel that is hit, in order: float64 (hits, 3).
+    `paint` puts colours back where they belong. Lengths are in the scene's unit, normals and directions of length 1.
     """
 
     scene: Scene
@@ -277,6 +280,13 @@ def error(block: Block) -> np.ndarray:
     return picture
 
 
+def wrong_pixels(picture: np.ndarray) -> int:
+    """How many pixels of a picture (height, width, 3) at stage `error` have a colour that says wrong."""
+    colours = to_bytes(np.array([WRONG_SHAPE, FALSE_HIT, FALSE_MISS]))
+    same = ([picture[..., k] == byte for k, byte in enumerate(colour)] for colour in colours)
+    return sum(int(np.logical_and.reduce(bands).sum()) for bands in same)
+
+
 def cost(block: Block) -> np.ndarray:
     """How many shapes each pixel is tested against: those in whose boxes it lies."""
     assert block.tests is not None
@@ -325,6 +335,7 @@ TESTS_LEGEND = (
 
 
 def background(scene: Scene) -> tuple[Colour, Colour]:
+    """The one colour of hits, where a kernel paints them alike, and that of the rest."""
     return BLACK, scene.background
 
 
@@ -334,7 +345,11 @@ def black(scene: Scene) -> tuple[Colour, Colour]:
 
 @dataclass(frozen=True)
 class Stage:
-    """One row of `STAGES`."""
+    """One row of `STAGES`: its key in the window, its function from a `Block` to colours, and what it needs.
+
+    The function returns float64 (rows, width, 3), 0 for black and 1 for full. What it does not ask for
+    (`needs_normals`, `needs_lights`, …) is not computed.
+    """
 
     key: str  # in the window
     colours: Callable[[Block], np.ndarray]

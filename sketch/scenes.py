@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
+
+from raytracer.interpreter import in_order_of_names
 
 
 class NoScenesError(Exception):
@@ -16,7 +17,7 @@ def find_scenes(where: Path) -> tuple[tuple[Path, ...], int]:
     if not where.exists():
         raise NoScenesError(f"{where}: there is no such file or folder")
     try:
-        scenes = tuple(sorted(folder.glob("*.cli"), key=_in_order_of_names))
+        scenes = tuple(sorted(folder.glob("*.cli"), key=in_order_of_names))
     except OSError as error:
         raise NoScenesError(f"{folder}: {error.strerror}") from None
     if where == folder:
@@ -26,9 +27,3 @@ def find_scenes(where: Path) -> tuple[tuple[Path, ...], int]:
     if where not in scenes:
         raise NoScenesError(f"{where}: expected a folder or a scene (.cli)")
     return scenes, scenes.index(where)
-
-
-def _in_order_of_names(path: Path) -> tuple[list[str | int], str]:
-    """Numbers within names count by their value: scene 2 comes before scene 10."""
-    parts = re.split(r"([0-9]+)", path.name.lower())
-    return [int(part) if i % 2 else part for i, part in enumerate(parts)], path.name

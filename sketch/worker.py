@@ -18,7 +18,6 @@ import numpy as np
 from raytracer import Cancelled, Scene, backend, interpreter, make_plan
 from raytracer.compare import Comparison, compare, difference_picture
 from raytracer.faults import FileError
-from raytracer.image import to_bytes
 from raytracer.methods import CERTIFIED
 from raytracer.mistakes import recognise
 from raytracer.plug import Order
@@ -26,7 +25,7 @@ from raytracer.plug_process import PlugRunner
 from raytracer.render import draw, warm_up
 from raytracer.samples import Samples, draw_samples
 from raytracer.scene import Vector
-from raytracer.stages import FALSE_HIT, FALSE_MISS, WRONG_SHAPE
+from raytracer.stages import wrong_pixels
 from sketch.orbit import HOME, Orbit, pivot_of, seen_from
 from sketch.pace import COARSENESS, Pace, enlarged
 
@@ -317,9 +316,4 @@ def bring_in_kernels(seen: Drawing) -> bool:
 
 def _wrong(request: Request, picture: np.ndarray) -> int | None:
     """How many pixels of a picture at stage `error` have a colour that says wrong; None for another stage."""
-    if request.stage != "error":
-        return None
-    return sum(
-        int(np.logical_and.reduce([picture[..., k] == byte for k, byte in enumerate(to_bytes(np.array(colour)))]).sum())
-        for colour in (WRONG_SHAPE, FALSE_HIT, FALSE_MISS)
-    )
+    return wrong_pixels(picture) if request.stage == "error" else None

@@ -91,6 +91,6 @@ def test_the_chart_is_drawn(tmp_path):
 
     said = []
     paths = chart_samples(tmp_path, said.append, size=40, rounds=1)
-    assert [path.name for path in paths] == ["chart-samples.png", "chart-samples.svg"]
+    assert [path.name for path in paths] == ["chart-samples.csv", "chart-samples.png", "chart-samples.svg"]
     assert len(said) == 3
-    assert "adaptive" in paths[1].read_text()
+    assert "adaptive" in paths[2].read_text()
