@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import secrets
+from enum import Enum
 from pathlib import Path
 from typing import IO
 
@@ -38,9 +39,38 @@ def check_fits_memory(width: int, height: int, at_work: int) -> None:
         )
 
 
+class Depth(Enum):
+    """How a colour's numbers are written: in 8 or 16 bits, from 0 to 1, or as they are."""
+
+    BYTE = "8"
+    WORD = "16"
+    FLOAT = "float"
+
+    @property
+    def kind(self) -> type[np.generic]:
+        """The numbers of an array of them."""
+        return {Depth.BYTE: np.uint8, Depth.WORD: np.uint16, Depth.FLOAT: np.float32}[self]
+
+    @property
+    def white(self) -> int:
+        """What is written for 1."""
+        return {Depth.BYTE: 255, Depth.WORD: 65535, Depth.FLOAT: 1}[self]
+
+    def write(self, colours: np.ndarray) -> np.ndarray:
+        """floor(255 · clip(C, 0, 1) + ½), or 65535 in place of 255; as float32 within its range.
+
+        A NaN, what lies beyond float64, is black.
+        """
+        colours = np.nan_to_num(colours)
+        if self is Depth.FLOAT:
+            largest = np.finfo(np.float32).max
+            return np.clip(colours, -largest, largest).astype(np.float32)
+        return (np.clip(colours, 0.0, 1.0) * self.white + 0.5).astype(self.kind)
+
+
 def to_bytes(colours: np.ndarray) -> np.ndarray:
-    """floor(255 · clip(C, 0, 1) + ½) as uint8; a NaN, what lies beyond float64, is black."""
-    return (np.clip(np.nan_to_num(colours), 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
+    """floor(255 · clip(C, 0, 1) + ½) as uint8."""
+    return Depth.BYTE.write(colours)
 
 
 def check_can_save(path: str | os.PathLike[str]) -> None:

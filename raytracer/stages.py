@@ -193,10 +193,13 @@ class Whole:
 
     hits: Hits | None
     tests: np.ndarray | None = None  # int32 (height, width), how many spheres each pixel is tested against
+    reach: tuple[float, float] | None = None  # `range`, where it is known already, of a larger picture
 
     @cached_property
     def range(self) -> tuple[float, float]:
         """The smallest and the largest t of all hits."""
+        if self.reach is not None:
+            return self.reach
         assert self.hits is not None
         t = self.hits.t[self.hits.index >= 0]
         return (float(t.min()), float(t.max())) if t.size else (1.0, 1.0)
