@@ -99,14 +99,14 @@ def make_lens(raster: Raster) -> Lens:
     nx, ny, nz = ((ldexp(x, -e), ldexp(y, -e), ldexp(z, -e)) for (x, y, z), e in zip(rows, exponents, strict=True))
     cross_x, cross_y = _cross(nx, nz), _cross(ny, nz)
     width, height, shift = float(raster.width), float(raster.whole_height), float(SAMPLINGS[raster.sampling])
-    rows_drawn = float(raster.first_row), float(raster.height)
+    first_row, rows_drawn = float(raster.first_row), float(raster.height)
     up_x, up_y = exponents[0] - exponents[2], exponents[1] - exponents[2]
     if max(abs(up_x), abs(up_y)) > _FARTHEST_APART:
         up_x, up_y, magnification = 0, 0, inf
     return Lens(
         nx, ny, nz, inner(*nz, *nz), inner(*nx, *nz), inner(*ny, *nz), inner(*cross_x, *cross_x),
-        inner(*cross_y, *cross_y), ldexp(1.0, up_x), ldexp(1.0, up_y), _CROSSES * magnification, width, height, *rows_drawn, shift,
-        *_cone(raster),
+        inner(*cross_y, *cross_y), ldexp(1.0, up_x), ldexp(1.0, up_y), _CROSSES * magnification, width, height, first_row,
+        rows_drawn, shift, *_cone(raster),
     )  # fmt: skip
 
 
@@ -179,7 +179,7 @@ def _range(
 
 
 def _pixels(low: Number, high: Number, unit: float, offset: float, start: float, size: float) -> tuple[Number, Number]:
-    """The first pixel from `low` on, and the one after the last up to `high`, within so many that begin with `start`."""
+    """The first pixel from `low` on, and the one after the last up to `high`, within so many from `start` on."""
     first = np.ceil((low * unit + offset) * 0.5) - start
     end = np.floor((high * unit + offset) * 0.5) + 1.0 - start
     return _clipped(first, size), _clipped(end, size)

@@ -59,9 +59,7 @@ def _power_series(x: Decimal, first: int) -> Decimal:
     return total
 
 
-def make_raster(
-    camera: Camera, width: int, height: int, sampling: str = "corner", rows: slice | None = None
-) -> Raster:
+def make_raster(camera: Camera, width: int, height: int, sampling: str = "corner", rows: slice | None = None) -> Raster:
     """The rays of a picture, or of some of its rows.
 
     ValueError for a size or a sampling that there is not, or `PictureTooLargeError`.

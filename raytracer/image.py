@@ -5,6 +5,8 @@ from __future__ import annotations
 import errno
 import os
 import secrets
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from enum import Enum
 from pathlib import Path
 from typing import IO
@@ -47,9 +49,11 @@ class Depth(Enum):
     FLOAT = "float"
 
     @property
-    def kind(self) -> type[np.generic]:
+    def kind(self) -> type[np.uint8] | type[np.uint16] | type[np.float32]:
         """The numbers of an array of them."""
-        return {Depth.BYTE: np.uint8, Depth.WORD: np.uint16, Depth.FLOAT: np.float32}[self]
+        if self is Depth.FLOAT:
+            return np.float32
+        return np.uint8 if self is Depth.BYTE else np.uint16
 
     @property
     def white(self) -> int:
@@ -85,38 +89,61 @@ def check_can_save(path: str | os.PathLike[str]) -> None:
 
 
 def save_png(path: str | os.PathLike[str], picture: np.ndarray) -> None:
-    """Write uint8 (height, width, 3) as a PNG, whole or not at all: an existing file stays until the new one stands.
+    """Write uint8 or uint16 (height, width, 3) as a PNG, whole or not at all (see `save`)."""
+    save(path, lambda file: encode_png(file, picture))
+
+
+def encode_png(file: IO[bytes], picture: np.ndarray) -> None:
+    """Write uint8 or uint16 (height, width, 3) as a PNG."""
+    if picture.dtype == np.uint16:  # which PIL does not write
+        from raytracer.png import deflate_rows, write_png
+
+        height, width, _ = picture.shape
+        write_png(file, width, height, 16, [deflate_rows(picture)])
+        return
+    from PIL import Image  # slow to load, and not needed to draw
+
+    Image.fromarray(picture).save(file, "PNG")
+
+
+def save(path: str | os.PathLike[str], write: Callable[[IO[bytes]], object]) -> None:
+    """Write a file, whole or not at all: an existing file stays until the new one stands.
 
     A link is followed, a pipe or device written to as it is. Raises `OSError`.
     """
     check_can_save(path)
     path = Path(path).resolve()
     try:
-        if path.exists() and not path.is_file():
-            with path.open("wb") as file:
-                _encode(picture, file)
+        if is_file_to_be(path):
+            _replace(path, write)
         else:
-            _replace(path, picture)
+            with path.open("wb") as file:
+                write(file)
     except OSError as error:
         raise OSError(error.errno, error.strerror, str(path)) from error
 
 
-def _replace(path: Path, picture: np.ndarray) -> None:
-    draft = path.with_name(f".{secrets.token_hex(8)}.part")
+def is_file_to_be(path: Path) -> bool:
+    """Whether there is a file, or nothing, and no pipe or device."""
+    return path.is_file() or not path.exists()
+
+
+def _replace(path: Path, write: Callable[[IO[bytes]], object]) -> None:
+    with drafted(path) as draft, draft.open("xb") as file:
+        write(file)
+
+
+@contextmanager
+def drafted(path: Path) -> Iterator[Path]:
+    """Where to write a file that takes the path's place at the end, if nothing fails."""
+    draft = path.with_name(f".{secrets.token_hex(8)}.part{path.suffix}")
     try:
-        with draft.open("xb") as file:
-            _encode(picture, file)
-            file.flush()
+        yield draft
+        with draft.open("rb+") as file:
             os.fsync(file.fileno())
         draft.replace(path)
     finally:
         draft.unlink(missing_ok=True)
-
-
-def _encode(picture: np.ndarray, file: IO[bytes]) -> None:
-    from PIL import Image  # slow to load, and not needed to draw
-
-    Image.fromarray(picture).save(file, "PNG")
 
 
 def load_png(path: str | os.PathLike[str]) -> np.ndarray:

@@ -118,8 +118,8 @@ def make_plan(
     """The plan for a picture; ValueError for a stage, a size, a sampling or a method that there is not.
 
     Stage and method are those of a table, by name, or rows that are in none. `path` is `raytracer.plain` or
-    `raytracer.kernels`, and chosen by default; a method that is in no table is traced by numpy. `depth` is how a colour's
-    numbers are written; `rows` is for a part of the picture only.
+    `raytracer.kernels`, and chosen by default; a method that is in no table is traced by numpy. `depth` is how
+    the numbers of a colour are written; `rows` is for a part of the picture only.
     """
     name, row = (stage.about, stage) if isinstance(stage, Stage) else (stage, _stage_named(stage))
     raster = make_raster(scene.camera, width, height, sampling, rows)

@@ -7,10 +7,10 @@ triangles) is held as arrays behind the face of a sequence: `scene.spheres[i]` i
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
-from typing import TypeVar, overload
+from typing import Any, TypeVar, overload
 
 import numpy as np
 
@@ -79,6 +79,11 @@ def vector(row: np.ndarray) -> Vector:
     return x, y, z
 
 
+def _made_anew(thing: Any) -> tuple[object, ...]:
+    """How to unpickle a dataclass: by making it anew, so that arrays lie as they must, and nothing kept goes along."""
+    return type(thing), tuple(getattr(thing, each.name) for each in fields(thing) if each.init)
+
+
 class _Table(Sequence[Row]):
     """A read-only sequence whose rows live in arrays; a subclass says which arrays, and how row i is made of them."""
 
@@ -91,6 +96,9 @@ class _Table(Sequence[Row]):
 
     def _row(self, i: int) -> Row:
         raise NotImplementedError
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return _made_anew(self)
 
     def __len__(self) -> int:
         return len(self.arrays()[0])
@@ -216,6 +224,9 @@ class Scene:
     spheres: Spheres = Spheres()
     triangles: Triangles = Triangles()
     path: Path | None = field(default=None, compare=False)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return _made_anew(self)
 
     def __len__(self) -> int:
         """The number of shapes, of all kinds."""

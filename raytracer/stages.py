@@ -344,6 +344,8 @@ class Stage:
     needs_lights: bool = False
     throws_on: bool = False  # follows light beyond the eye ray's hit: towards the lights, and off mirrors
     needs_whole: bool = False  # looks at the hits of other rows than its own
+    needs_range: bool = False  # but of those only at the range of t
+    needs_next_row: bool = False  # or only at the row below
     needs_truth: bool = False  # compares the method's hits with the true ones
     needs_tests: bool = False  # counts how many spheres a pixel is tested against
     legend: tuple[tuple[tuple[float, float, float], str], ...] = ()  # what its colours mean
@@ -372,10 +374,12 @@ STAGES = {
         painter="paint_normal", flat=black,
     ),
     "depth": Stage(
-        "z", depth, "near is white, far is grey, nothing is black", needs_whole=True, painter="paint_depth", flat=black
+        "z", depth, "near is white, far is grey, nothing is black", needs_whole=True, needs_range=True,
+        painter="paint_depth", flat=black,
     ),
     "edges": Stage(
-        "e", edges, "the borders between different shapes", needs_whole=True, painter="paint_edges", flat=black
+        "e", edges, "the borders between different shapes", needs_whole=True, needs_next_row=True,
+        painter="paint_edges", flat=black,
     ),
     "cost": Stage(
         "k", cost, "how many shapes each pixel is tested against", needs_hits=False, needs_tests=True,
