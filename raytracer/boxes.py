@@ -105,8 +105,8 @@ def make_lens(raster: Raster) -> Lens:
         up_x, up_y, magnification = 0, 0, inf
     return Lens(
         nx, ny, nz, inner(*nz, *nz), inner(*nx, *nz), inner(*ny, *nz), inner(*cross_x, *cross_x),
-        inner(*cross_y, *cross_y), ldexp(1.0, up_x), ldexp(1.0, up_y), _CROSSES * magnification, width, height, first_row,
-        rows_drawn, shift, *_cone(raster),
+        inner(*cross_y, *cross_y), ldexp(1.0, up_x), ldexp(1.0, up_y), _CROSSES * magnification, width, height,
+        first_row, rows_drawn, shift, *_cone(raster),
     )  # fmt: skip
 
 

@@ -38,7 +38,8 @@ class Band(NamedTuple):
 
     @classmethod
     def unpack(cls, packed: bytes) -> Band:
-        return cls(*_HEAD.unpack_from(packed), packed[_HEAD.size :])
+        checksum, length = _HEAD.unpack_from(packed)
+        return cls(checksum, length, packed[_HEAD.size :])
 
 
 def deflate_rows(rows: np.ndarray) -> Band:

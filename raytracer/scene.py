@@ -92,7 +92,7 @@ class _Table(Sequence[Row]):
             array.flags.writeable = False
 
     def arrays(self) -> list[np.ndarray]:
-        return [value for value in vars(self).values() if isinstance(value, np.ndarray)]
+        raise NotImplementedError
 
     def _row(self, i: int) -> Row:
         raise NotImplementedError
@@ -195,6 +195,9 @@ class Triangles(_Table[Triangle]):
     material: np.ndarray = field(default_factory=lambda: np.empty(0, np.int32))  # (n,) int32, row of `materials`
     order: np.ndarray = field(default_factory=lambda: np.empty(0, np.int32))  # (n,) int32
     materials: Materials = Materials()
+
+    def arrays(self) -> list[np.ndarray]:
+        return [self.vertices, self.material, self.order]
 
     @cached_property
     def corner_numbers(self) -> np.ndarray:

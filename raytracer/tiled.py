@@ -25,6 +25,7 @@ from pathlib import Path
 from tempfile import gettempdir
 from typing import TypeVar
 
+from raytracer import backend
 from raytracer.camera import BAND_PIXELS
 from raytracer.crew import Crew, CrewError
 from raytracer.image import Depth, PictureTooLargeError, check_can_save, check_fits_memory, is_file_to_be, save
@@ -136,6 +137,8 @@ def draw_part(part: Part) -> bytes:
     rows, height = part.rows, part.picture.height
     above, below = _apron(part.picture)
     drawn = slice(max(rows.start - above, 0), min(rows.stop + below, height))
+    if drawn != slice(0, height):
+        backend.load()  # more will follow
     plan = part.picture.plan(drawn, part.reach)
     pixels = draw_samples(plan, part.picture.samples, threads=1)
     return deflate_rows(pixels[rows.start - drawn.start : rows.stop - drawn.start]).pack()
