@@ -49,11 +49,15 @@ class Tally:
         return self.busy / (self.workers * (perf_counter() - self.started)) if self.workers else 1.0
 
     def __str__(self) -> str:
-        seconds, s = perf_counter() - self.started, "" if self.workers == 1 else "s"
+        seconds = perf_counter() - self.started
         return (
-            f"{self.jobs} pieces in {seconds:.3g} s by {self.workers} worker{s}: "
+            f"{_count(self.jobs, 'piece')} in {seconds:.3g} s by {_count(self.workers, 'worker')}: "
             f"busy for {self.busy:.3g} of {self.workers} × {seconds:.3g} s, {self.efficiency:.0%}"
         )
+
+
+def _count(number: int, word: str) -> str:
+    return f"{number} {word}{'' if number == 1 else 's'}"
 
 
 @dataclass(frozen=True)
@@ -75,7 +79,7 @@ class Crew:
                     under_way[self.executor.submit(_timed, work, job)] = job
                 if not under_way:
                     return
-                for future in wait(under_way, return_when=FIRST_COMPLETED).done:
+                for future in sorted(wait(under_way, return_when=FIRST_COMPLETED).done, key=_has_failed):
                     yield under_way.pop(future), self._result(future)
         finally:
             for future in under_way:
@@ -94,6 +98,11 @@ class Crew:
         self.tally.busy += seconds
         self.tally.names.add(name)
         return done
+
+
+def _has_failed(future: Future[Any]) -> bool:
+    """Those come last, so that nothing is lost that is done."""
+    return future.cancelled() or future.exception() is not None
 
 
 def _timed(work: Callable[[Job], Done], job: Job) -> tuple[Done, float, str]:
@@ -132,7 +141,11 @@ def _cluster(address: str) -> Iterator[Crew]:
         if not (count.isdecimal() and int(count) >= 1):
             raise ValueError(f"--cluster: found {address!r}, expected local:N, N being 1 or more, or HOST:PORT")
         here = LocalCluster(
-            n_workers=int(count), threads_per_worker=1, processes=True, dashboard_address=None, silence_logs="CRITICAL"
+            n_workers=int(count),
+            threads_per_worker=1,
+            processes=True,
+            dashboard_address="127.0.0.1:0",
+            silence_logs="CRITICAL",
         )
     try:
         with Client(here or address, timeout=_PATIENCE, set_as_default=False) as client:

@@ -39,6 +39,7 @@ from raytracer.stages import Stage
 
 _BAND_PIXELS = 1 << 22  # a second's work or less at most stages
 _TILE = 64  # rows: bands begin where the tiles of the screen do
+_BANDS = 16  # or more, if they have so many rows: enough for a few workers
 _ADAPTIVE_RAYS = 8  # a pixel, about
 _REACH = struct.Struct("<2d")
 
@@ -104,7 +105,7 @@ class Picture:
     def bands(self) -> list[slice]:
         """Its rows in pieces of about equal work, which begin where tiles of the screen do, if they can."""
         rays = _ADAPTIVE_RAYS if self.samples == ADAPTIVE else int(self.samples)
-        rows = max(1, _BAND_PIXELS // (self.width * rays))
+        rows = min(max(1, _BAND_PIXELS // (self.width * rays)), max(_TILE, self.height // _BANDS))
         rows = rows // _TILE * _TILE or rows
         return [slice(start, min(start + rows, self.height)) for start in range(0, self.height, rows)]
 
