@@ -153,8 +153,9 @@ def chart(arguments: argparse.Namespace) -> int:
     with tqdm(bar_format="{desc}", leave=False, disable=None) as line:
         paths = chart_contacts(arguments.output, progress=line.set_description_str)
         paths += chart_samples(arguments.output, progress=line.set_description_str)
-        for path in [*paths, *draw_charts(arguments.output, arguments.long, progress=line.set_description_str)]:
-            print(path)
+        effort = arguments.output, arguments.long
+        paths += draw_charts(*effort, progress=line.set_description_str, cluster=arguments.cluster)
+    print(*paths, sep="\n")
     return 0
 
 
@@ -280,12 +281,12 @@ _SAMPLES = Argument(
         "help": "rays a pixel: 1, 4, 16, 64, 256, or adaptive, where neighbours differ; default 1",
     },
 )
+_CLUSTER = Argument(
+    ("--cluster",), {"metavar": "ADDRESS", "help": "have it done by a dask scheduler's workers; local:N starts N here"}
+)
 _CREW = (
     Argument(("--threads",), {"metavar": "N", "type": count, "help": "default: as many as there are cores"}),
-    Argument(
-        ("--cluster",),
-        {"metavar": "ADDRESS", "help": "have it drawn by a dask scheduler's workers; local:N starts N here"},
-    ),
+    _CLUSTER,
 )
 COMMANDS: dict[str, tuple[Callable[[argparse.Namespace], int], tuple[Argument, ...]]] = {
     "render": (
@@ -363,6 +364,7 @@ COMMANDS: dict[str, tuple[Callable[[argparse.Namespace], int], tuple[Argument, .
         (
             _FOLDER,
             Argument(("--long",), {"action": "store_true", "help": "ten times the rays, and about ten times as long"}),
+            _CLUSTER,
         ),
     ),
     "bench": (

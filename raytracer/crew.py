@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from itertools import islice
 from socket import gethostname
-from threading import get_ident
+from threading import Event, get_ident
 from time import perf_counter
 from typing import Any, TypeVar
 
@@ -27,6 +27,8 @@ Done = TypeVar("Done")
 _AHEAD = 2  # jobs under way for each worker: one to work on, one to go on with
 _PATIENCE = 30  # seconds until a cluster has to answer, and until it has a worker
 LOCAL = "local:"
+
+_given_up = Event()
 
 
 class CrewError(OSError):
@@ -126,7 +128,14 @@ def open_crew(cluster: str | None = None, threads: int | None = None) -> Iterato
     try:
         yield Crew(executor, lambda: count)
     finally:
+        _given_up.set()
         executor.shutdown(cancel_futures=True)
+        _given_up.clear()
+
+
+def given_up() -> bool:
+    """Whether nobody waits any more for what the threads of this process are at work on."""
+    return _given_up.is_set()
 
 
 @contextmanager

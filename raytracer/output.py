@@ -68,7 +68,7 @@ def check_suffix(path: str | os.PathLike[str], suffixes: tuple[str, ...]) -> Non
     path = Path(path)
     if path.suffix.lower() not in suffixes and is_file_to_be(path) and not path.is_dir():
         found = f"suffix {path.suffix!r}" if path.suffix else "no suffix"
-        raise ValueError(f"{path}: found {found}, expected {' or '.join(suffixes)}")
+        raise ValueError(f"{path}: found {found}, expected {' or '.join(each or 'a folder' for each in suffixes)}")
 
 
 def check_plugged(picture: Picture, path: Path, cluster: str | None) -> None:

@@ -27,7 +27,7 @@ from typing import TypeVar
 
 from raytracer import backend
 from raytracer.camera import BAND_PIXELS
-from raytracer.crew import Crew, CrewError
+from raytracer.crew import Crew, CrewError, given_up
 from raytracer.image import Depth, PictureTooLargeError, check_can_save, check_fits_memory, is_file_to_be, save
 from raytracer.methods import CERTIFIED, Method
 from raytracer.plan import Plan, make_plan
@@ -102,12 +102,17 @@ class Picture:
     def pixels(self) -> int:
         return self.width * self.height
 
-    def bands(self) -> list[slice]:
-        """Its rows in pieces of about equal work, which begin where tiles of the screen do, if they can."""
+    @property
+    def rows_a_band(self) -> int:
+        """Of pieces of about equal work, which begin where tiles of the screen do, if they can."""
         rays = _ADAPTIVE_RAYS if self.samples == ADAPTIVE else int(self.samples)
         rows = min(max(1, _BAND_PIXELS // (self.width * rays)), max(_TILE, self.height // _BANDS))
-        rows = rows // _TILE * _TILE or rows
-        return [slice(start, min(start + rows, self.height)) for start in range(0, self.height, rows)]
+        return min(rows // _TILE * _TILE or rows, self.height)
+
+    def bands(self) -> list[slice]:
+        """Its rows in such pieces."""
+        step = self.rows_a_band
+        return [slice(start, min(start + step, self.height)) for start in range(0, self.height, step)]
 
 
 @cache
@@ -141,7 +146,7 @@ def draw_part(part: Part) -> bytes:
     if drawn != slice(0, height):
         backend.load()  # more will follow
     plan = part.picture.plan(drawn, part.reach)
-    pixels = draw_samples(plan, part.picture.samples, threads=1)
+    pixels = draw_samples(plan, part.picture.samples, threads=1, cancelled=given_up)
     return deflate_rows(pixels[rows.start - drawn.start : rows.stop - drawn.start]).pack()
 
 
@@ -157,7 +162,7 @@ def find_reach(part: Part) -> bytes:
     part.check()
     plan = part.picture.plan(part.rows)
     with open_tracer(plan, 1) as tracer:
-        hits = hits_of(plan, tracer, Watch(1))
+        hits = hits_of(plan, tracer, Watch(1, cancelled=given_up))
     t = hits.t[hits.index >= 0]
     return _REACH.pack(t.min(initial=float("inf")), t.max(initial=0.0))
 
@@ -169,10 +174,11 @@ def draw_large(picture: Picture, path: str | os.PathLike[str], crew: Crew, progr
     """
     check_can_save(path)
     path = Path(path).resolve()
-    stage, bands = picture.first_row().stage, picture.bands()
+    stage = picture.first_row().stage
     if stage.needs_whole and not (stage.needs_range or stage.needs_next_row):
         raise ValueError(f"stage {picture.stage!r} looks at the whole picture, which cannot be drawn in bands then")
     check_fits(picture, path, crew.workers())
+    bands = picture.bands()
     with kept_beside(path, picture.digest) as folder:
         count = len(bands) * (2 if stage.needs_range else 1)
         shelf, reach = Shelf(folder, crew, count, progress), None
@@ -187,8 +193,7 @@ def draw_large(picture: Picture, path: str | os.PathLike[str], crew: Crew, progr
 
 def check_fits(picture: Picture, path: Path, workers: int) -> None:
     """Raise `PictureTooLargeError`, with the figures, if memory does not hold the bands, or the disk the picture."""
-    rows = max(rows.stop - rows.start for rows in picture.bands())
-    check_fits_memory(picture.width, rows * workers, max(picture.width, BAND_PIXELS))
+    check_fits_memory(picture.width, picture.rows_a_band * workers, max(picture.width, BAND_PIXELS))
     least, free = int(6 * picture.pixels * SMALLEST / (2 if picture.depth is Depth.BYTE else 1)), disk_left(path)
     if least > free:
         raise PictureTooLargeError(

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from PIL import Image
 
-from raytracer.crew import Crew
+from raytracer.crew import Crew, given_up
 from raytracer.image import check_can_save, check_fits_memory, drafted, encode_png
 from raytracer.orbit import pivot_of, turned
 from raytracer.output import check_suffix
@@ -64,7 +64,7 @@ def draw_frame(part: Part) -> bytes:
     """A PNG file."""
     part.check()
     file = io.BytesIO()
-    encode_png(file, draw_samples(part.picture.plan(), part.picture.samples, threads=1))
+    encode_png(file, draw_samples(part.picture.plan(), part.picture.samples, threads=1, cancelled=given_up))
     return file.getvalue()
 
 
