@@ -9,6 +9,7 @@ scheduler gives its jobs to others.
 from __future__ import annotations
 
 import os
+import signal
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
@@ -139,6 +140,22 @@ def given_up() -> bool:
 
 
 @contextmanager
+def _deaf_to_interrupts() -> Iterator[None]:
+    """Threads and processes that begin here leave Ctrl-C to the main thread, which learns of it when this ends."""
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        yield
+        return
+    from multiprocessing import resource_tracker
+
+    resource_tracker.ensure_running()  # which would end it, the first time that a process is started
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
 def _cluster(address: str) -> Iterator[Crew]:
     try:
         from distributed import Client, LocalCluster
@@ -149,13 +166,9 @@ def _cluster(address: str) -> Iterator[Crew]:
         count = address.removeprefix(LOCAL)
         if not (count.isdecimal() and int(count) >= 1):
             raise ValueError(f"--cluster: found {address!r}, expected local:N, N being 1 or more, or HOST:PORT")
-        here = LocalCluster(
-            n_workers=int(count),
-            threads_per_worker=1,
-            processes=True,
-            dashboard_address="127.0.0.1:0",
-            silence_logs="CRITICAL",
-        )
+        quiet = {"dashboard_address": "127.0.0.1:0", "silence_logs": "CRITICAL"}
+        with _deaf_to_interrupts():
+            here = LocalCluster(n_workers=int(count), threads_per_worker=1, processes=True, **quiet)
     try:
         with Client(here or address, timeout=_PATIENCE, set_as_default=False) as client:
             try:

@@ -22,6 +22,7 @@ from test_trace import PATHS
 from raytracer import STAGES, Camera, PictureTooLargeError, Scene, Stage, interpreter, load_png, tiled
 from raytracer.crew import Crew, CrewError, open_crew
 from raytracer.image import Depth
+from raytracer.measure import _pose, pose
 from raytracer.plan import make_plan
 from raytracer.render import draw
 from raytracer.samples import draw_samples
@@ -244,6 +245,13 @@ def test_a_client_that_comes_back_has_nothing_drawn_twice(cluster, tmp_path, sma
     draw_large(picture, tmp_path / "x.png", crew)
     assert crew.tally.jobs == len(picture.bands()) - len(kept)
     np.testing.assert_array_equal(load_png(tmp_path / "x.png"), draw(picture.plan()))
+
+
+def test_the_truth_of_the_charts_rays_is_worked_out_by_others(cluster):
+    found = dict(fresh(cluster).work(_pose, [("tangent", 128), ("tied", 64)]))
+    for (family, rays), problem in found.items():
+        np.testing.assert_array_equal(problem.t, pose(family, rays).t)
+        np.testing.assert_array_equal(problem.index, pose(family, rays).index)
 
 
 def render(*words, **options):
