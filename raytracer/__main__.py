@@ -5,44 +5,58 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Callable
-from contextlib import closing
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
 from importlib import resources
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from tqdm import tqdm
 
 from raytracer import Plan, Scene, SceneError, interpreter, interrupts, make_plan, probe_pixel, save_png
 from raytracer.camera import SAMPLINGS
-from raytracer.image import check_can_save
+from raytracer.image import Depth, check_can_save
 from raytracer.methods import CERTIFIED, METHODS
 from raytracer.plug import Order, PlugError
 from raytracer.plug_process import PATIENCE, PlugRunner, plugged_file, seconds
-from raytracer.samples import SAMPLES, Samples, check_samples, draw_samples
+from raytracer.render import Progress
+from raytracer.samples import SAMPLES, Samples
 from raytracer.stages import STAGES
+
+if TYPE_CHECKING:
+    from raytracer.tiled import Picture
 
 
 def render(arguments: argparse.Namespace) -> int:
-    """Draw a scene into a PNG file."""
+    """Draw a scene into a PNG or an OpenEXR file."""
+    from raytracer.output import check_plugged, depth_of, write_picture
+
     check_can_save(arguments.output)
-    plan = _plan(arguments)
-    check_samples(arguments.samples, plan)
-    for warning in plan.warnings:
-        print(f"{arguments.scene}: {warning}", file=sys.stderr)
-    with tqdm(unit=" bands", delay=1, leave=False, disable=None) as bar:
+    picture = _picture(arguments, depth_of(arguments.output, arguments.bits))
+    if arguments.plug:
+        check_plugged(picture, arguments.output, arguments.cluster)
+        drawn = _by_plug(arguments, picture.cargo.scene)
+        if drawn is not None:
+            save_png(arguments.output, drawn)
+            return 0
+    crew = {"cluster": arguments.cluster, "threads": arguments.threads}
+    with _progress("bands") as show:
+        tally = write_picture(picture, arguments.output, **crew, progress=show, cancelled=interrupts.came)
+    if tally is not None:
+        print(tally, file=sys.stderr)
+    return 0
 
-        def show(done: int, total: int, rows: slice) -> None:
-            bar.total = total
-            bar.update(1)
 
-        picture = _by_plug(arguments, plan.scene) if arguments.plug else None
-        if picture is None:
-            picture = draw_samples(
-                plan, arguments.samples, threads=arguments.threads, progress=show, cancelled=interrupts.came
-            )
-    save_png(arguments.output, picture)
+def turntable(arguments: argparse.Namespace) -> int:
+    """Film a scene, the camera going once round it: a GIF, an MP4, or a folder of PNG files."""
+    from raytracer.crew import open_crew
+    from raytracer.turntable import film
+
+    picture = _picture(arguments)
+    with open_crew(arguments.cluster, arguments.threads) as crew, _progress("frames") as show:
+        film(picture, arguments.output, arguments.frames, crew, show)
+    print(crew.tally, file=sys.stderr)
     return 0
 
 
@@ -159,8 +173,9 @@ def chart(arguments: argparse.Namespace) -> int:
     with tqdm(bar_format="{desc}", leave=False, disable=None) as line:
         paths = chart_contacts(arguments.output, progress=line.set_description_str)
         paths += chart_samples(arguments.output, progress=line.set_description_str)
-        for path in [*paths, *draw_charts(arguments.output, arguments.long, progress=line.set_description_str)]:
-            print(path)
+        effort = arguments.output, arguments.long
+        paths += draw_charts(*effort, progress=line.set_description_str, cluster=arguments.cluster)
+    print(*paths, sep="\n")
     return 0
 
 
@@ -200,6 +215,29 @@ def _whole(text: str) -> int:
     if not text.isdecimal():
         raise ValueError(f"--write-scene: found {text!r}, expected a number of spheres")
     return int(text)
+
+
+def _picture(arguments: argparse.Namespace, depth: Depth = Depth.BYTE) -> Picture:
+    """The picture that is asked for; says what the user should know of it."""
+    from raytracer.tiled import Cargo, Picture
+
+    size = *arguments.size, arguments.sampling, arguments.method, arguments.samples, depth
+    picture = Picture(Cargo(interpreter(arguments.scene)), arguments.stage, *size)
+    for warning in picture.first_row().warnings:
+        print(f"{arguments.scene}: {warning}", file=sys.stderr)
+    return picture
+
+
+@contextmanager
+def _progress(unit: str) -> Iterator[Progress]:
+    """A bar on a terminal, after a second."""
+    with tqdm(unit=f" {unit}", delay=1, leave=False, disable=None) as bar:
+
+        def show(done: int, total: int, rows: slice) -> None:
+            bar.total = total
+            bar.update(1)
+
+        yield show
 
 
 def _plan(arguments: argparse.Namespace) -> Plan:
@@ -273,26 +311,39 @@ _FOLDER = Argument(
     {"metavar": "FOLDER", "type": Path, "default": Path("docs"), "help": "where to, default docs"},
 )
 _SEED = Argument(("--seed",), {"metavar": "S", "type": int, "default": 1, "help": "of what is random, default 1"})
+_SAMPLES = Argument(
+    ("--samples",),
+    {
+        "metavar": "N",
+        "type": samples,
+        "choices": SAMPLES,
+        "default": 1,
+        "help": "rays a pixel: 1, 4, 16, 64, 256, or adaptive, where neighbours differ; default 1",
+    },
+)
+_CLUSTER = Argument(
+    ("--cluster",), {"metavar": "ADDRESS", "help": "have it done by a dask scheduler's workers; local:N starts N here"}
+)
+_CREW = (
+    Argument(("--threads",), {"metavar": "N", "type": count, "help": "default: as many as there are cores"}),
+    _CLUSTER,
+)
 COMMANDS: dict[str, tuple[Callable[[argparse.Namespace], int], tuple[Argument, ...]]] = {
     "render": (
         render,
         (
             _SCENE,
             Argument(
-                ("-o", "--output"), {"metavar": "OUT.png", "type": Path, "required": True, "help": "the file to write"}
+                ("-o", "--output"),
+                {"metavar": "OUT.png", "type": Path, "required": True, "help": "the file to write, or an OUT.exr"},
             ),
             *_PICTURE,
+            _SAMPLES,
             Argument(
-                ("--samples",),
-                {
-                    "metavar": "N",
-                    "type": samples,
-                    "choices": SAMPLES,
-                    "default": 1,
-                    "help": "rays a pixel: 1, 4, 16, 64, 256, or adaptive, where neighbours differ; default 1",
-                },
+                ("--bits",),
+                {"type": int, "choices": (8, 16), "default": 8, "help": "of a colour's number in a PNG, default 8"},
             ),
-            Argument(("--threads",), {"metavar": "N", "type": count, "help": "default: as many as there are cores"}),
+            *_CREW,
             Argument(
                 ("--plug",),
                 {
@@ -302,6 +353,22 @@ COMMANDS: dict[str, tuple[Callable[[argparse.Namespace], int], tuple[Argument, .
                 },
             ),
             _PATIENCE,
+        ),
+    ),
+    "turntable": (
+        turntable,
+        (
+            _SCENE,
+            Argument(
+                ("-o", "--output"),
+                {"metavar": "OUT.gif", "type": Path, "required": True, "help": "or an OUT.mp4, or a folder for PNGs"},
+            ),
+            Argument(
+                ("--frames",), {"metavar": "N", "type": count, "default": 100, "help": "25 a second, default 100"}
+            ),
+            *_PICTURE,
+            _SAMPLES,
+            *_CREW,
         ),
     ),
     "test": (
@@ -365,6 +432,7 @@ COMMANDS: dict[str, tuple[Callable[[argparse.Namespace], int], tuple[Argument, .
         (
             _FOLDER,
             Argument(("--long",), {"action": "store_true", "help": "ten times the rays, and about ten times as long"}),
+            _CLUSTER,
         ),
     ),
     "bench": (

@@ -54,7 +54,9 @@ class Lens(NamedTuple):
     size_z: float
     crosses: float
     width: float  # in pixels
-    height: float
+    height: float  # of the whole picture
+    first_row: float  # of those that are drawn
+    rows: float  # that are drawn
     shift: float  # of the ray in its pixel, in half pixels
     axis: Row  # the direction of the picture's middle, of length 1
     cos: float  # of the widest angle between it and a ray of the picture
@@ -63,8 +65,8 @@ class Lens(NamedTuple):
 
 def _cone(raster: Raster) -> tuple[Row, float, float]:
     """The axis of a cone that holds all rays of a picture, and cos and sin of its angle, whose widest are corners."""
-    grid = eye_grid(raster)
-    corners = directions_of(grid, grid.across[[0, 0, -1, -1]], grid.up[[0, -1, 0, -1]])
+    across, up = raster.ends()
+    corners = directions_of(eye_grid(raster), across[[0, 0, -1, -1]], up[[0, -1, 0, -1]])
     rays = [_unit(row) for row in np.array(corners).T.tolist()]
     axis = _unit([sum(column) for column in zip(*rays, strict=True)])
     cos = min(inner(*axis, *ray) for ray in rays)
@@ -101,14 +103,15 @@ def make_lens(raster: Raster) -> Lens:
     exponents = [frexp(max(map(abs, row)))[1] for row in rows]
     nx, ny, nz = ((ldexp(x, -e), ldexp(y, -e), ldexp(z, -e)) for (x, y, z), e in zip(rows, exponents, strict=True))
     cross_x, cross_y = _cross(nx, nz), _cross(ny, nz)
-    width, height, shift = float(raster.width), float(raster.height), float(SAMPLINGS[raster.sampling])
+    width, height, shift = float(raster.width), float(raster.whole_height), float(SAMPLINGS[raster.sampling])
+    first_row, rows_drawn = float(raster.first_row), float(raster.height)
     up_x, up_y = exponents[0] - exponents[2], exponents[1] - exponents[2]
     if max(abs(up_x), abs(up_y)) > _FARTHEST_APART:
         up_x, up_y, magnification = 0, 0, inf
     return Lens(
         nx, ny, nz, inner(*nz, *nz), inner(*nx, *nz), inner(*ny, *nz), inner(*cross_x, *cross_x),
         inner(*cross_y, *cross_y), ldexp(1.0, up_x), ldexp(1.0, up_y), hypot(*nx), hypot(*ny), hypot(*nz),
-        _CROSSES * magnification, width, height, shift, *_cone(raster),
+        _CROSSES * magnification, width, height, first_row, rows_drawn, shift, *_cone(raster),
     )  # fmt: skip
 
 
@@ -138,8 +141,8 @@ def box_of(lens: Lens, qx: Number, qy: Number, qz: Number, radius: Number) -> Bo
     low_x, high_x = _range(x, z, r2, part, half, nx, nz, lens.xz, lens.cross_x, lens.scale_x)
     low_y, high_y = _range(y, z, r2, part, half, ny, nz, lens.yz, lens.cross_y, lens.scale_y)
     # U = (2x + shift − W) / H and V = (H − 2y − shift) / H, solved for x and y
-    left, right = _pixels(low_x, high_x, lens.height, lens.width - lens.shift, lens.width)
-    top, bottom = _pixels(-high_y, -low_y, lens.height, lens.height - lens.shift, lens.height)
+    left, right = _pixels(low_x, high_x, lens.height, lens.width - lens.shift, 0.0, lens.width)
+    top, bottom = _pixels(-high_y, -low_y, lens.height, lens.height - lens.shift, lens.first_row, lens.rows)
     known = (k33 > lens.crosses * (zz + r2zz)) & (right >= 0.0) & (bottom >= 0.0)
     return Box(left, right, top, bottom, known, z)
 
@@ -163,11 +166,11 @@ def facet_box(lens: Lens, a: Three, b: Three, c: Three) -> Four:
         left, right = select(low_x < left, low_x, left), select(high_x > right, high_x, right)
         top, bottom = select(low_y < top, low_y, top), select(high_y > bottom, high_y, bottom)
     known = ahead & (lens.crosses < inf)
-    left, right = _pixels(left, right, lens.height, lens.width - lens.shift, lens.width)
-    top, bottom = _pixels(top, bottom, lens.height, lens.height - lens.shift, lens.height)
+    left, right = _pixels(left, right, lens.height, lens.width - lens.shift, 0.0, lens.width)
+    top, bottom = _pixels(top, bottom, lens.height, lens.height - lens.shift, lens.first_row, lens.rows)
     return (
         select(known, left, 0.0), select(known, right, select(behind, 0.0, lens.width)),
-        select(known, top, 0.0), select(known, bottom, select(behind, 0.0, lens.height)),
+        select(known, top, 0.0), select(known, bottom, select(behind, 0.0, lens.rows)),
     )  # fmt: skip
 
 
@@ -204,10 +207,10 @@ def _range(
     return scale * (middle - wide) - _PAD, scale * (middle + wide) + _PAD
 
 
-def _pixels(low: Number, high: Number, unit: float, offset: float, size: float) -> tuple[Number, Number]:
-    """The first pixel from `low` on, and the one after the last up to `high`, within the picture."""
-    first = np.ceil((low * unit + offset) * 0.5)
-    end = np.floor((high * unit + offset) * 0.5) + 1.0
+def _pixels(low: Number, high: Number, unit: float, offset: float, start: float, size: float) -> tuple[Number, Number]:
+    """The first pixel from `low` on, and the one after the last up to `high`, within so many from `start` on."""
+    first = np.ceil((low * unit + offset) * 0.5) - start
+    end = np.floor((high * unit + offset) * 0.5) + 1.0 - start
     return _clipped(first, size), _clipped(end, size)
 
 

@@ -5,7 +5,8 @@
 
 for pixel column x and row y, counted from the top left, of a picture of W × H pixels. That goes through the pixel's
 upper left corner; `sampling="centre"` goes through (x + ½, y + ½). U and V are rational numbers: `numerators` gives
-them times H, which are integers, so that nobody who needs them exactly has to guess.
+them times H, which are integers, so that nobody who needs them exactly has to guess. A picture may be drawn in bands of
+rows, each on its own: a band's rays, and whatever is worked out for all of them, are the same as in the whole.
 """
 
 from __future__ import annotations
@@ -58,8 +59,11 @@ def _power_series(x: Decimal, first: int) -> Decimal:
     return total
 
 
-def make_raster(camera: Camera, width: int, height: int, sampling: str = "corner") -> Raster:
-    """The rays of a picture; ValueError for a size or a sampling that there is not, or `PictureTooLargeError`."""
+def make_raster(camera: Camera, width: int, height: int, sampling: str = "corner", rows: slice | None = None) -> Raster:
+    """The rays of a picture, or of some of its rows.
+
+    ValueError for a size or a sampling that there is not, or `PictureTooLargeError`.
+    """
     width, height = index(width), index(height)
     if width < 1 or height < 1:
         raise ValueError(f"a picture of {width} x {height} pixels has nothing to show; expected at least 1 x 1")
@@ -68,8 +72,10 @@ def make_raster(camera: Camera, width: int, height: int, sampling: str = "corner
     if sampling not in SAMPLINGS:
         raise ValueError(f"found sampling {sampling!r}, expected one of {', '.join(SAMPLINGS)}")
     _check_camera(camera)
-    check_fits_memory(width, height, max(width, BAND_PIXELS))
-    return Raster(camera, width, height, sampling)
+    if rows is None:
+        rows = slice(0, height)
+    check_fits_memory(width, rows.stop - rows.start, max(width, BAND_PIXELS))
+    return Raster(camera, width, rows.stop - rows.start, sampling, rows.start, height)
 
 
 @lru_cache(maxsize=64)
@@ -85,12 +91,19 @@ def _check_camera(camera: Camera) -> None:
 
 
 class Raster(NamedTuple):
-    """A picture's rays: the camera, the picture's size, and where in a pixel its ray goes through."""
+    """The rays of a picture or of some of its rows: the camera, the size, and where in a pixel its ray goes through."""
 
     camera: Camera
     width: int
-    height: int
-    sampling: str = "corner"
+    height: int  # rows, which are counted from 0 everywhere but here
+    sampling: str
+    first_row: int  # where they begin in the picture
+    whole_height: int  # of the picture: H above
+
+    def finer(self, times: int) -> Raster:
+        """So many columns for each, and as many rows."""
+        size, place = (self.width * times, self.height * times), (self.first_row * times, self.whole_height * times)
+        return Raster(self.camera, *size, self.sampling, *place)
 
     def bands(self, tests_a_pixel: float = 0.0) -> list[slice]:
         """The picture's rows, cut into pieces that are traced one at a time; none takes long."""
@@ -101,13 +114,20 @@ class Raster(NamedTuple):
     def numerators(self, xs: Number, ys: Number) -> tuple[Number, Number]:
         """H·U and H·V for columns xs and rows ys: integers, exactly."""
         shift = SAMPLINGS[self.sampling]
-        return 2 * xs + shift - self.width, self.height - 2 * ys - shift
+        return 2 * xs + shift - self.width, self.whole_height - 2 * (ys + self.first_row) - shift
+
+    def ends(self) -> tuple[np.ndarray, np.ndarray]:
+        """U of the first and the last column, V of the first and the last row, of the whole picture: (2,) each."""
+        across, up = self.numerators(
+            np.array([0, self.width - 1]), np.array([0, self.whole_height - 1]) - self.first_row
+        )
+        return across / self.whole_height, up / self.whole_height
 
     def whole_direction(self, x: int, y: int) -> tuple[tuple[int, int, int], int]:
         """D as the language defines it, without rounding: integers, and what they are to be divided by."""
         (ux, uy, uz, vx, vy, vz, bx, by, bz), unit = _whole_frame(self.camera)
         across, up = self.numerators(x, y)
-        height = self.height
+        height = self.whole_height
         steps = (
             across * ux + up * vx - height * bx,
             across * uy + up * vy - height * by,
@@ -141,9 +161,9 @@ def eye_grid(raster: Raster) -> Grid:
     across, _ = raster.numerators(np.arange(raster.width), 0)
     _, up = raster.numerators(0, np.arange(raster.height))
     u, v, d = raster.camera.u, raster.camera.v, focal_length(raster.camera.fov)
-    across, up = across / raster.height, up / raster.height
+    across, up = across / raster.whole_height, up / raster.whole_height
     back = d * raster.camera.w[0], d * raster.camera.w[1], d * raster.camera.w[2]
-    widest, highest = np.abs(across).max(), np.abs(up).max()
+    widest, highest = (np.abs(ends).max() for ends in raster.ends())
     sizes = [widest * abs(x) + highest * abs(y) + abs(z) for x, y, z in zip(u, v, back, strict=True)]
     a1 = 2.0 * (up * inner(*u, *v) - inner(*u, *back))
     a0 = (up * inner(*v, *v) - 2.0 * inner(*v, *back)) * up + inner(*back, *back)
@@ -176,14 +196,14 @@ def directions_of(grid: Grid, across: np.ndarray, up: np.ndarray) -> Vectors:
 def fine_columns(raster: Raster) -> Twofold:
     """U of each column in two-fold float64: two arrays (width,)."""
     across, _ = raster.numerators(np.arange(raster.width), 0)
-    return _ratio(across.astype(float), float(raster.height))
+    return _ratio(across.astype(float), float(raster.whole_height))
 
 
 @lru_cache(maxsize=8)
 def fine_rows(raster: Raster) -> tuple[Twofold, Twofold, Twofold]:
     """V·v − d·w of each row in two-fold float64: for each component two arrays (height,)."""
     _, up = raster.numerators(0, np.arange(raster.height))
-    fine_up, back = _ratio(up.astype(float), float(raster.height)), focal_length(raster.camera.fov)
+    fine_up, back = _ratio(up.astype(float), float(raster.whole_height)), focal_length(raster.camera.fov)
     x, y, z = (
         add(*multiply(*fine_up, v, 0.0), *two_product(-back, w))
         for v, w in zip(raster.camera.v, raster.camera.w, strict=True)
@@ -193,7 +213,7 @@ def fine_rows(raster: Raster) -> tuple[Twofold, Twofold, Twofold]:
 
 def twofold_eye_rays(raster: Raster, xs: np.ndarray, ys: np.ndarray) -> TwofoldRays:
     """The rays of single pixels, columns xs and rows ys, arrays of shape (n,)."""
-    across, up = (_ratio(n.astype(float), float(raster.height)) for n in raster.numerators(xs, ys))
+    across, up = (_ratio(n.astype(float), float(raster.whole_height)) for n in raster.numerators(xs, ys))
     back = focal_length(raster.camera.fov)
     camera = raster.camera
     components, sizes = [], []
@@ -245,8 +265,9 @@ def seen_at(raster: Raster, offsets: np.ndarray) -> np.ndarray | None:
         return None
     across, up, ahead = np.array(inverse[0]) @ offsets.T
     shift = SAMPLINGS[raster.sampling]
-    x, y = raster.height * across + (raster.width - shift) * ahead, (raster.height - shift) * ahead - raster.height * up
-    return np.stack([x / 2, y / 2, ahead], axis=1)
+    height = raster.whole_height
+    x, y = height * across + (raster.width - shift) * ahead, (height - shift) * ahead - height * up
+    return np.stack([x / 2, y / 2 - raster.first_row * ahead, ahead], axis=1)
 
 
 def spread(raster: Raster) -> float:

@@ -85,12 +85,13 @@ def chart(
     long: bool = False,
     progress: Callable[[str], object] = lambda text: None,
     effort: Effort | None = None,
+    cluster: str | None = None,
 ) -> list[Path]:
     """Measure every method on every backend; write the pictures and the table into the folder; return their paths."""
     effort = effort or Effort()
     effort = effort.tenfold() if long else effort
     folder.mkdir(parents=True, exist_ok=True)
-    scores, frames = score_families(effort, progress), score_scenes(effort, progress)
+    scores, frames = score_families(effort, progress, cluster), score_scenes(effort, progress)
     progress("drawing")
     return [write_table(folder / "chart.csv", scores, frames), *draw_charts(folder, scores, frames)]
 

@@ -6,8 +6,9 @@ import errno
 import os
 import secrets
 import time
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from enum import Enum
 from glob import escape
 from pathlib import Path
 from typing import IO
@@ -44,9 +45,40 @@ def check_fits_memory(width: int, height: int, at_work: int) -> None:
         )
 
 
+class Depth(Enum):
+    """How a colour's numbers are written: in 8 or 16 bits, from 0 to 1, or as they are."""
+
+    BYTE = "8"
+    WORD = "16"
+    FLOAT = "float"
+
+    @property
+    def kind(self) -> type[np.uint8] | type[np.uint16] | type[np.float32]:
+        """The numbers of an array of them."""
+        if self is Depth.FLOAT:
+            return np.float32
+        return np.uint8 if self is Depth.BYTE else np.uint16
+
+    @property
+    def white(self) -> int:
+        """What is written for 1."""
+        return {Depth.BYTE: 255, Depth.WORD: 65535, Depth.FLOAT: 1}[self]
+
+    def write(self, colours: np.ndarray) -> np.ndarray:
+        """floor(255 · clip(C, 0, 1) + ½), or 65535 in place of 255; as float32 within its range.
+
+        A NaN, what lies beyond float64, is black.
+        """
+        colours = np.nan_to_num(colours)
+        if self is Depth.FLOAT:
+            largest = np.finfo(np.float32).max
+            return np.clip(colours, -largest, largest).astype(np.float32)
+        return (np.clip(colours, 0.0, 1.0) * self.white + 0.5).astype(self.kind)
+
+
 def to_bytes(colours: np.ndarray) -> np.ndarray:
-    """floor(255 · clip(C, 0, 1) + ½) as uint8; a NaN, what lies beyond float64, is black."""
-    return (np.clip(np.nan_to_num(colours), 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
+    """floor(255 · clip(C, 0, 1) + ½) as uint8."""
+    return Depth.BYTE.write(colours)
 
 
 def check_can_save(path: str | os.PathLike[str]) -> None:
@@ -61,11 +93,21 @@ def check_can_save(path: str | os.PathLike[str]) -> None:
 
 
 def save_png(path: str | os.PathLike[str], picture: np.ndarray) -> None:
-    """Write uint8 (height, width, 3) as a PNG, whole or not at all: an existing file stays until the new one stands.
+    """Write uint8 or uint16 (height, width, 3) as a PNG, whole or not at all (see `save`)."""
+    save(path, lambda file: encode_png(file, picture))
 
-    Raises `OSError`.
-    """
-    save(path, lambda file: _encode(picture, file))
+
+def encode_png(file: IO[bytes], picture: np.ndarray) -> None:
+    """Write uint8 or uint16 (height, width, 3) as a PNG."""
+    if picture.dtype == np.uint16:  # which PIL does not write
+        from raytracer.png import deflate_rows, write_png
+
+        height, width, _ = picture.shape
+        write_png(file, width, height, 16, [deflate_rows(picture)])
+        return
+    from PIL import Image  # slow to load, and not needed to draw
+
+    Image.fromarray(picture).save(file, "PNG")
 
 
 def save(path: str | os.PathLike[str], write: Callable[[IO[bytes]], object]) -> None:
@@ -76,22 +118,33 @@ def save(path: str | os.PathLike[str], write: Callable[[IO[bytes]], object]) -> 
     check_can_save(path)
     path = Path(path).resolve()
     try:
-        if path.exists() and not path.is_file():
+        if is_file_to_be(path):
+            _replace(path, write)
+        else:
             with path.open("wb") as file:
                 write(file)
-        else:
-            _replace(path, write)
     except OSError as error:
         raise OSError(error.errno, error.strerror, str(path)) from error
 
 
+def is_file_to_be(path: Path) -> bool:
+    """Whether there is a file, or nothing, and no pipe or device."""
+    return path.is_file() or not path.exists()
+
+
 def _replace(path: Path, write: Callable[[IO[bytes]], object]) -> None:
+    with drafted(path) as draft, draft.open("xb") as file:
+        write(file)
+
+
+@contextmanager
+def drafted(path: Path) -> Iterator[Path]:
+    """Where to write a file that takes the path's place at the end, if nothing fails."""
     _sweep(path)
-    draft = path.with_name(f".{path.name[:_NAMED]}.{secrets.token_hex(8)}.part")
+    draft = path.with_name(f".{path.name[:_NAMED]}.{secrets.token_hex(8)}.part{path.suffix}")
     try:
-        with draft.open("xb") as file:
-            write(file)
-            file.flush()
+        yield draft
+        with draft.open("rb+") as file:
             os.fsync(file.fileno())
         draft.replace(path)
     finally:
@@ -100,16 +153,10 @@ def _replace(path: Path, write: Callable[[IO[bytes]], object]) -> None:
 
 def _sweep(path: Path) -> None:
     """Remove drafts of this file that were left behind: nobody has written to them for an hour."""
-    for draft in path.parent.glob(f".{escape(path.name[:_NAMED])}.{'[0-9a-f]' * 16}.part"):
+    for draft in path.parent.glob(f".{escape(path.name[:_NAMED])}.{'[0-9a-f]' * 16}.part{escape(path.suffix)}"):
         with suppress(OSError):
             if draft.stat().st_mtime < time.time() - _STALE:
                 draft.unlink()
-
-
-def _encode(picture: np.ndarray, file: IO[bytes]) -> None:
-    from PIL import Image  # slow to load, and not needed to draw
-
-    Image.fromarray(picture).save(file, "PNG")
 
 
 def load_png(path: str | os.PathLike[str]) -> np.ndarray:

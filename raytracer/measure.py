@@ -23,6 +23,7 @@ import numpy as np
 
 from raytracer import backend, exact, plain
 from raytracer.arrays import Hits
+from raytracer.crew import open_crew
 from raytracer.families import FAMILIES, Bundle, bundles
 from raytracer.interpreter import interpreter
 from raytracer.methods import METHODS
@@ -133,14 +134,12 @@ def racers(effort: Effort) -> list[Racer]:
     return [Racer(method, name) for name in there for method in effort.methods]
 
 
-def score_families(effort: Effort, progress: Progress) -> list[Score]:
-    """A score for each racer and family, and one for each racer and all stress families together."""
-    entrants = racers(effort)
-    problems = []
-    for family in effort.families:
-        progress(f"truth: {family}")
-        problems.append(pose(family, effort.ordinary_rays if FAMILIES[family].ordinary else effort.rays))
-    scores = []
+def score_families(effort: Effort, progress: Progress, cluster: str | None = None) -> list[Score]:
+    """A score for each racer and family, and one for each racer and all stress families together.
+
+    A cluster (see `crew.open_crew`) works out the truth; it is gone again before anything is timed.
+    """
+    entrants, problems, scores = racers(effort), _problems(effort, progress, cluster), list[Score]()
     checked: dict[tuple[Racer, str], Hits] = {}
     for racer in entrants:
         progress(f"errors: {racer.method}, {racer.backend}")
@@ -159,6 +158,24 @@ def score_families(effort: Effort, progress: Progress) -> list[Score]:
         found = time_family(entrants, problem, checked, effort)
         times.update({(racer, problem.family): seconds for racer, seconds in found.items()})
     return [score._replace(times=times.get((score.racer, score.family), ())) for score in scores]
+
+
+def _problems(effort: Effort, progress: Progress, cluster: str | None) -> list[Problem]:
+    sizes = {name: effort.ordinary_rays if FAMILIES[name].ordinary else effort.rays for name in effort.families}
+    if cluster is None:
+        found = {}
+        for family, rays in sizes.items():
+            progress(f"truth: {family}")
+            found[family] = pose(family, rays)
+    else:
+        progress("truth")
+        with open_crew(cluster) as crew:
+            found = {family: problem for (family, _), problem in crew.work(_pose, sizes.items())}
+    return [found[family] for family in sizes]
+
+
+def _pose(job: tuple[str, int]) -> Problem:
+    return pose(*job)
 
 
 def pose(family: str, rays: int) -> Problem:

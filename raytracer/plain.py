@@ -57,7 +57,7 @@ def bound(lens: Lens, origin: np.ndarray, balls: np.ndarray) -> tuple[np.ndarray
     x, y, z = xyz(balls[:, :3] - origin)
     box, (c, square) = box_of(lens, x, y, z, balls[:, 3]), side_of(x, y, z, balls[:, 3])
     hidden = (box.known & (box.ahead <= 0.0)) | (~box.known & beside(lens, x, y, z, c, square, balls[:, 3]))
-    whole = np.array([0, lens.width, 0, lens.height])
+    whole = np.array([0, lens.width, 0, lens.rows])
     sides = np.stack(box[:4], axis=-1)
     front = box.known & (box.ahead > 0.0)
     sides = np.where(front[:, None], sides, np.where(hidden[:, None], 0.0, whole))

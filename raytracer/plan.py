@@ -15,6 +15,7 @@ from raytracer.bounce import MOST_REFLECTIONS
 from raytracer.camera import Raster, eye_grid, make_raster
 from raytracer.eye import Eye, open_eye
 from raytracer.full import terms_of
+from raytracer.image import Depth
 from raytracer.methods import CERTIFIED, Method, row_of
 from raytracer.scene import Light, Scene
 from raytracer.stages import LIGHT_RANGE, STAGES, Stage
@@ -41,6 +42,8 @@ class Plan:
     lights: tuple[Light, ...]
     forced: ModuleType | None = None  # who traces, if it is not to be chosen
     unchecked: bool = False  # paint `diffuse` without certainty, to measure what that costs
+    depth: Depth = Depth.BYTE
+    reach: tuple[float, float] | None = None  # the least and the largest t of a picture of which this is a part
 
     @cached_property
     def eye(self) -> Eye:
@@ -82,7 +85,7 @@ class Plan:
     def painter(self) -> str:
         """The kernel that paints the whole stage, or nothing if numpy does."""
         beyond = self._has_far_lights or (self.stage.throws_on and not self._has_squares)
-        painter = self.stage.painter if self.on_screen and not beyond else ""
+        painter = self.stage.painter if self.on_screen and self.depth is Depth.BYTE and not beyond else ""
         if painter == "paint_diffuse" and len(self.scene.triangles):
             return "paint_diffuse_any"
         return f"{painter}_unchecked" if painter and self.unchecked else painter
@@ -132,16 +135,21 @@ def make_plan(
     sampling: str = "corner",
     method: str | Method = CERTIFIED,
     path: ModuleType | None = None,
+    depth: Depth = Depth.BYTE,
+    rows: slice | None = None,
 ) -> Plan:
     """The plan for a picture; ValueError for a stage, a size, a sampling or a method that there is not.
 
     Stage and method are those of a table, by name, or rows that are in none. `path` is `raytracer.plain` or
-    `raytracer.kernels`, and chosen by default; a method that is in no table is traced by numpy.
+    `raytracer.kernels`, and chosen by default; a method that is in no table is traced by numpy. `depth` is how
+    the numbers of a colour are written; `rows` is for a part of the picture only.
     """
     name, row = (stage.about, stage) if isinstance(stage, Stage) else (stage, _stage_named(stage))
-    raster, path = make_raster(scene.camera, width, height, sampling), plain if isinstance(method, Method) else path
+    raster = make_raster(scene.camera, width, height, sampling, rows)
+    path = plain if isinstance(method, Method) else path
     row_of(method)
-    return Plan(scene, name, row, raster, method, _lights_that_matter(scene) if row.needs_lights else (), path)
+    lights = _lights_that_matter(scene) if row.needs_lights else ()
+    return Plan(scene, name, row, raster, method, lights, path, depth=depth)
 
 
 def _stage_named(name: str) -> Stage:

@@ -15,7 +15,7 @@ import numpy as np
 from raytracer import backend
 from raytracer.arrays import FullPaints, Hits, Paints, Tiles
 from raytracer.eye import Eye, count_tests
-from raytracer.image import to_bytes
+from raytracer.image import Depth, to_bytes
 from raytracer.methods import CERTIFIED, Method
 from raytracer.notebook import Picture
 from raytracer.plan import Plan, make_plan
@@ -76,7 +76,7 @@ def draw(
 ) -> np.ndarray:
     """`render_scene` for whoever has made the plan already."""
     shape = plan.raster.height, plan.raster.width, 3
-    picture = np.empty(shape, np.uint8) if out is None else fitting(out, shape)
+    picture = np.empty(shape, plan.depth.kind) if out is None else fitting(out, shape, plan.depth)
     if plan.painter and make_canvas(picture) is None:
         picture[...] = draw(plan, threads=threads, progress=progress, cancelled=cancelled)
         return picture
@@ -222,6 +222,8 @@ def _paint_whole(plan: Plan, screen: Screen, picture: np.ndarray, watch: Watch) 
     if screen.unit:
         np.ldexp(t, screen.unit, out=t)  # in the scene's own unit some may be too small or too large for a float64
     painter, (near, far) = getattr(plan.path, plan.painter), screen.range_of(t, index)
+    if plan.reach is not None:
+        near, far = np.ldexp(plan.reach, -screen.unit).tolist()
     share_bands(screen, plan, watch, paint)
 
 
@@ -234,8 +236,8 @@ def _draw_rows(
 
 @np.errstate(all="ignore")
 def colours_of(plan: Plan, block: Block) -> np.ndarray:
-    """The stage's colours of a block, as bytes."""
-    return to_bytes(plan.stage.colours(block))
+    """The stage's colours of a block, as they are written."""
+    return plan.depth.write(plan.stage.colours(block))
 
 
 def block_of(plan: Plan, tracer: Eye | Screen, rows: slice, worker: int = 0, whole: Whole | None = None) -> Block:
@@ -255,7 +257,7 @@ def whole_of(plan: Plan, tracer: Eye | Screen, watch: Watch | None = None) -> Wh
     """What a stage wants to know of the whole picture before it draws the first pixel."""
     if plan.stage.needs_tests:
         return Whole(None, count_tests(tracer.boxes, plan.raster))
-    return Whole(hits_of(plan, tracer, watch)) if plan.stage.needs_whole else None
+    return Whole(hits_of(plan, tracer, watch), reach=plan.reach) if plan.stage.needs_whole else None
 
 
 def hits_of(plan: Plan, tracer: Eye | Screen, watch: Watch | None = None, polished: bool = False) -> Hits:
@@ -321,8 +323,8 @@ def _no_hits(rows: slice, width: int) -> Hits:
     return Hits(np.empty(shape), np.empty(shape, np.int32))
 
 
-def fitting(out: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    if not isinstance(out, np.ndarray) or out.shape != shape or out.dtype != np.uint8:
+def fitting(out: np.ndarray, shape: tuple[int, ...], depth: Depth = Depth.BYTE) -> np.ndarray:
+    if not isinstance(out, np.ndarray) or out.shape != shape or out.dtype != depth.kind:
         found = f"{out.dtype} {out.shape}" if isinstance(out, np.ndarray) else type(out).__name__
-        raise ValueError(f"out: found {found}, expected uint8 {shape}")
+        raise ValueError(f"out: found {found}, expected {np.dtype(depth.kind)} {shape}")
     return out

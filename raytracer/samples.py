@@ -18,9 +18,9 @@ from math import isqrt
 import numpy as np
 
 from raytracer.arrays import Hits
-from raytracer.camera import BAND_PIXELS, Raster
+from raytracer.camera import BAND_PIXELS
 from raytracer.eye import Eye
-from raytracer.image import check_fits_memory
+from raytracer.image import Depth, check_fits_memory
 from raytracer.plan import Plan
 from raytracer.render import (
     Easel,
@@ -39,7 +39,7 @@ from raytracer.stages import Block, Stage
 ADAPTIVE = "adaptive"
 SAMPLES = (1, 4, 16, 64, 256, ADAPTIVE)
 SIDE = 8  # of the block of samples of a pixel, where `adaptive` takes more than one
-DIFFERS = 16  # bytes by which neighbours differ that are looked at more closely
+DIFFERS = 16  # of 255 by which neighbours differ that are looked at more closely
 _TILE = 64  # pixels of the large picture, along a tile's edge
 _PAINTED = 32  # pixels that a kernel paints in the memory of one that numpy is at work on
 
@@ -74,14 +74,14 @@ def draw_samples(
         return draw(plan, threads=threads, out=out, progress=progress, cancelled=cancelled)
     raster, side = plan.raster, SIDE if samples == ADAPTIVE else isqrt(int(samples))
     size = raster.height, raster.width, 3
-    fine = replace(plan, raster=Raster(raster.camera, raster.width * side, raster.height * side, raster.sampling))
+    fine = replace(plan, raster=raster.finer(side))
     strip = min(_TILE, fine.raster.height) * fine.raster.width
     check_fits_memory(raster.width, raster.height, max(strip // _PAINTED if fine.painter else strip, BAND_PIXELS))
     if samples == ADAPTIVE:
         picture = draw(plan, threads=threads, out=out, cancelled=cancelled)
-        wanted = differing(picture)
+        wanted = differing(picture, plan.depth)
     else:
-        picture = np.empty(size, np.uint8) if out is None else fitting(out, size)
+        picture = np.empty(size, plan.depth.kind) if out is None else fitting(out, size, plan.depth)
         wanted = np.ones(size[:2], bool)
     _draw_means(fine, side, wanted, picture, Watch(threads, progress, cancelled))
     return picture
@@ -102,7 +102,7 @@ def _draw_means(fine: Plan, side: int, wanted: np.ndarray, picture: np.ndarray, 
         share_pieces(strips, watch, 1, one)
 
 
-def differing(picture: np.ndarray) -> np.ndarray:
+def differing(picture: np.ndarray, depth: Depth = Depth.BYTE) -> np.ndarray:
     """Which pixels of a picture (height, width, 3) differ visibly from one of their eight neighbours: bool."""
     height, width, _ = picture.shape
     around = np.pad(picture, ((1, 1), (1, 1), (0, 0)), "edge")
@@ -111,7 +111,7 @@ def differing(picture: np.ndarray) -> np.ndarray:
         for x in range(3):
             shifted = around[y : y + height, x : x + width]
             low, high = np.minimum(low, shifted), np.maximum(high, shifted)
-    return np.asarray((high - low > DIFFERS).any(axis=2))
+    return np.asarray((high - low > DIFFERS * depth.white // 255).any(axis=2))
 
 
 def _draw_strip(
@@ -149,11 +149,11 @@ def _runs(wanted: np.ndarray) -> Iterator[slice]:
 
 
 def _means(fine: Plan, rows: slice, hits: Hits, side: int, ys: np.ndarray, xs: np.ndarray) -> np.ndarray:
-    """The means of the blocks of some pixels of these rows, no others being worked out: uint8 (n, 3)."""
+    """The means of the blocks of some pixels of these rows, no others being worked out: (n, 3)."""
     steps, shape = np.arange(side), (len(ys), side, side)
     y = np.broadcast_to((ys[:, None] * side + steps)[:, :, None], shape).reshape(-1)
     x = np.broadcast_to((xs[:, None] * side + steps)[:, None, :], shape).reshape(-1)
     block = Block(fine.scene, fine.raster, rows.start + y, Hits(hits.t[y, x], hits.index[y, x]), fine.lights, x)
     total = colours_of(fine, block).reshape(len(ys), -1, 3).sum(axis=1, dtype=np.uint32)
-    means: np.ndarray = ((total + side * side // 2) // (side * side)).astype(np.uint8)
+    means: np.ndarray = ((total + side * side // 2) // (side * side)).astype(fine.depth.kind)
     return means

@@ -7,10 +7,10 @@ triangles) is held as arrays behind the face of a sequence: `scene.spheres[i]` i
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
-from typing import TypeVar, overload
+from typing import Any, TypeVar, overload
 
 import numpy as np
 
@@ -89,6 +89,11 @@ def vector(row: np.ndarray) -> Vector:
     return x, y, z
 
 
+def _made_anew(thing: Any) -> tuple[object, ...]:
+    """How to unpickle a dataclass: by making it anew, so that arrays lie as they must, and nothing kept goes along."""
+    return type(thing), tuple(getattr(thing, each.name) for each in fields(thing) if each.init)
+
+
 class _Table(Sequence[Row]):
     """A read-only sequence whose rows live in arrays; a subclass says which arrays, and how row i is made of them."""
 
@@ -97,10 +102,13 @@ class _Table(Sequence[Row]):
             array.flags.writeable = False
 
     def arrays(self) -> list[np.ndarray]:
-        return [value for value in vars(self).values() if isinstance(value, np.ndarray)]
+        raise NotImplementedError
 
     def _row(self, i: int) -> Row:
         raise NotImplementedError
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return _made_anew(self)
 
     def __len__(self) -> int:
         return len(self.arrays()[0])
@@ -203,6 +211,9 @@ class Triangles(_Table[Triangle]):
     order: np.ndarray = field(default_factory=lambda: np.empty(0, np.int32))  # (n,) int32
     materials: Materials = Materials()
 
+    def arrays(self) -> list[np.ndarray]:
+        return [self.vertices, self.material, self.order]
+
     @cached_property
     def corner_numbers(self) -> np.ndarray:
         """A number for each corner, equal for equal ones: (n, 3) int64."""
@@ -244,6 +255,9 @@ class Scene:
     spheres: Spheres = Spheres()
     triangles: Triangles = Triangles()
     path: Path | None = field(default=None, compare=False)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return _made_anew(self)
 
     def __len__(self) -> int:
         """The number of shapes, of all kinds."""

@@ -199,10 +199,13 @@ class Whole:
 
     hits: Hits | None
     tests: np.ndarray | None = None  # int32 (height, width), how many spheres each pixel is tested against
+    reach: tuple[float, float] | None = None  # `range`, where it is known already, of a larger picture
 
     @cached_property
     def range(self) -> tuple[float, float]:
         """The smallest and the largest t of all hits."""
+        if self.reach is not None:
+            return self.reach
         assert self.hits is not None
         t = self.hits.t[self.hits.index >= 0]
         return (float(t.min()), float(t.max())) if t.size else (1.0, 1.0)
@@ -359,6 +362,8 @@ class Stage:
     needs_lights: bool = False
     throws_on: bool = False  # follows light beyond the eye ray's hit: towards the lights, and off mirrors
     needs_whole: bool = False  # looks at the hits of other rows than its own
+    needs_range: bool = False  # but of those only at the range of t
+    needs_next_row: bool = False  # or only at the row below
     needs_truth: bool = False  # compares the method's hits with the true ones
     needs_tests: bool = False  # counts how many spheres a pixel is tested against
     legend: tuple[tuple[tuple[float, float, float], str], ...] = ()  # what its colours mean
@@ -387,10 +392,12 @@ STAGES = {
         painter="paint_normal", flat=black,
     ),
     "depth": Stage(
-        "z", depth, "near is white, far is grey, nothing is black", needs_whole=True, painter="paint_depth", flat=black
+        "z", depth, "near is white, far is grey, nothing is black", needs_whole=True, needs_range=True,
+        painter="paint_depth", flat=black,
     ),
     "edges": Stage(
-        "e", edges, "the borders between different shapes", needs_whole=True, painter="paint_edges", flat=black
+        "e", edges, "the borders between different shapes", needs_whole=True, needs_next_row=True,
+        painter="paint_edges", flat=black,
     ),
     "cost": Stage(
         "k", cost, "how many shapes each pixel is tested against", needs_hits=False, needs_tests=True,

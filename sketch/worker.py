@@ -20,13 +20,14 @@ from raytracer.compare import Comparison, compare, difference_picture
 from raytracer.faults import FileError
 from raytracer.methods import CERTIFIED
 from raytracer.mistakes import recognise
+from raytracer.orbit import pivot_of
 from raytracer.plug import Order
 from raytracer.plug_process import PlugRunner
 from raytracer.render import draw, warm_up
 from raytracer.samples import Samples, draw_samples
 from raytracer.scene import Vector
 from raytracer.stages import wrong_pixels
-from sketch.orbit import HOME, Orbit, pivot_of, seen_from
+from sketch.orbit import HOME, Orbit, seen_from
 from sketch.pace import COARSENESS, Pace, enlarged
 
 BLANK = 40  # the grey of pixels that nothing was drawn on yet

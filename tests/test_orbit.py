@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from raytracer import Camera, Scene, eye_hits, interpreter, make_plan
 from raytracer.camera import make_raster
 from raytracer.interpreter import interpret
-from sketch.orbit import FARTHEST, HALF_TURN, HOME, POLE, Orbit, pivot_of, seen_from, turned
+from raytracer.orbit import pivot_of
+from sketch.orbit import FARTHEST, HALF_TURN, HOME, POLE, Orbit, seen_from, turned
 
 SCENES = Path(__file__).resolve().parent.parent / "scenes"
 SURFACE = "surface 1 0 0  0 0 0  0 0 0  1 0\n"
