@@ -59,6 +59,7 @@ def test_each_mistake_is_recognised_at_full(scene):
 
 
 SHADE = """
+fov 50
 background .1 .2 .3
 light 3 4 0  .8 .2 .2
 light -3 4 2  .2 .7 .3
@@ -127,6 +128,9 @@ ELSEWHERE = {
         replace(s, camera=replace(s.camera, w=tuple(-x for x in s.camera.w)))
     ),
     "eye taken as 0 0 0": lambda s: picture_of(replace(s, camera=replace(s.camera, eye=(0, 0, 0)))),
+    "tan(fov) in place of tan(fov / 2)": lambda s: picture_of(replace(s, camera=replace(s.camera, fov=100))),
+    "tan(fov / 2) in place of 1 / tan(fov / 2)": lambda s: picture_of(replace(s, camera=replace(s.camera, fov=130))),
+    "d = 1, whatever fov is": lambda s: picture_of(replace(s, camera=replace(s.camera, fov=90))),
     "V negated": lambda s: picture_of(replace(s, camera=replace(s.camera, v=tuple(-x for x in s.camera.v)))),
     "far root taken": lambda s: picture_of(s, method=usual(far_root)),
     "hits from inside missed": lambda s: picture_of(s, method=usual(near_root)),
@@ -194,11 +198,19 @@ def test_with_rays_through_centres_the_corners_are_the_mistake():
     assert recognise(picture_of(scene, sampling="centre"), scene, sampling="centre") == ()
 
 
-def test_a_few_stray_pixels_do_not_hide_a_mistake():
-    scene = interpret(SHADE)
-    picture = picture_of(scene, sampling="centre").copy()
-    picture[40, 40:44] = 255
-    assert recognise(picture, scene) == ("rays through the pixels' centres",)
+def test_a_few_stray_pixels_do_not_hide_a_mistake_and_many_do():
+    """Two of the hundred wrong ones on the outline: more than one in a hundred, but tangent rays may be."""
+    scene = interpreter(SCENES / "01_one_sphere.cli")
+    picture = render_scene(scene, "hit", 96, 96, sampling="centre")
+    assert 60 < np.count_nonzero(differences(picture, render_scene(scene, "hit", 96, 96))) < 180
+    for strays, found in ((2, ("rays through the pixels' centres",)), (60, ())):
+        picture[90, 10 : 10 + strays] = 255
+        assert recognise(picture, scene, "hit") == found
+
+
+def test_what_explains_nearly_as_much_is_not_named():
+    scene = interpreter(SCENES / "05_one_triangle.cli")
+    assert recognise(np.flipud(render_scene(scene)).copy(), scene) == ("upside down",)
 
 
 @pytest.mark.parametrize("stage", ["diffuse", "full"])
@@ -224,10 +236,10 @@ def test_other_pictures_show_no_mistake(stage, monkeypatch):
 
 @pytest.mark.parametrize("path", HARD, ids=lambda path: path.stem)
 def test_what_rounding_makes_wrong_is_no_mistake(path, monkeypatch):
-    monkeypatch.setattr(mistakes, "_SECONDS", 0.3)
+    monkeypatch.setattr(mistakes, "_SECONDS", 0.2)
     scene = interpreter(path)
     right = render_scene(scene, "diffuse", WIDTH, HEIGHT)
-    for method in ("textbook", "geometric", "compensated", "textbook32", "haines32"):
+    for method in ("textbook", "textbook32", "haines32"):
         found = recognise(render_scene(scene, "diffuse", WIDTH, HEIGHT, method=method), scene, expected=right)
         assert not found or found[0] in ("nothing is hit", "the lights add nothing"), method
 
