@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -218,7 +219,8 @@ class Guide:
         O = np.broadcast_to(O, D.shape) if own[:1].max(initial=-1) >= 0 else O  # noqa: E741
         near, far = (np.empty((len(D), len(self.scene))) for _ in range(2))
         near[:, ~self.flat], far[:, ~self.flat] = _meet_balls(O, D, self.centres[~self.flat], self.radii[~self.flat])
-        near[:, self.flat] = far[:, self.flat] = _meet_facets(O, D, self.corners)
+        if len(self.corners):
+            near[:, self.flat] = far[:, self.flat] = _meet_facets(O, D, self.triangles)
         if own[:1].max(initial=-1) < 0 or not steps.leaves:
             return near, far, np.zeros((1, 1))
         rays, chord = np.arange(len(D)), -2 * dot(O - self.centres[own], D)
@@ -251,6 +253,10 @@ class Guide:
     def corners(self) -> Array:
         """Of the triangles alone: (k, 3, 3)."""
         return np.asarray(self.scene.triangles.vertices)
+
+    @cached_property
+    def triangles(self) -> _Facets:
+        return _facets_of(self.corners)
 
     @cached_property
     def centres(self) -> Array:
@@ -348,12 +354,27 @@ def _meet_balls(O: Array, D: Array, centres: Array, radii: Array) -> Place:  # n
     return along - half_chord, along + half_chord
 
 
-def _meet_facets(O: Array, D: Array, corners: Array) -> Array:  # noqa: E741
-    """Where rays meet triangles, edges included, by barycentric coordinates: (n, k). T. Möller, B. Trumbore, 1997."""
+class _Facets(NamedTuple):
+    """Triangles (k, 3, 3) for rays from anywhere: what does not depend on the ray, arrays (k, 3)."""
+
+    first: Array
+    edge: Array
+    other: Array
+    normal: Array
+    edge_moment: Array
+    other_moment: Array
+
+
+def _facets_of(corners: Array) -> _Facets:
     first, edge, other = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    normal, moment = np.cross(edge, other), np.cross(O, D)
-    over = -1.0 / (D @ normal.T)
-    u = (moment @ other.T - D @ np.cross(other, first).T) * over
-    v = (D @ np.cross(edge, first).T - moment @ edge.T) * over
+    return _Facets(first, edge, other, np.cross(edge, other), np.cross(edge, first), np.cross(other, first))
+
+
+def _meet_facets(O: Array, D: Array, facets: _Facets) -> Array:  # noqa: E741
+    """Where rays meet triangles, edges included, by barycentric coordinates: (n, k). T. Möller, B. Trumbore, 1997."""
+    first, edge, other, normal, edge_moment, other_moment = facets
+    moment, over = np.cross(O, D), -1.0 / (D @ normal.T)
+    u = (moment @ other.T - D @ other_moment.T) * over
+    v = (D @ edge_moment.T - moment @ edge.T) * over
     t = (O @ normal.T - dot(first, normal)) * over
     return np.where((u >= -_SLIVER) & (v >= -_SLIVER) & (u + v <= 1 + _SLIVER), t, np.nan)

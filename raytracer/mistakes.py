@@ -407,8 +407,9 @@ def _singles(
         if mistake.judge is not None:
             share = mistake.judge(evidence)
         else:
-            active += [name] if evidence.first.is_changed(steps) else []
-            share = evidence.explained(steps)
+            drawn = evidence.first.drawn(steps)
+            active += [name] if (drawn != evidence.first.right).any() else []
+            share = evidence.first.share(steps, drawn) and evidence.explained(steps)
         if share:
             found[name] = share
     return found, active
@@ -421,7 +422,9 @@ def _pairs(evidence: _Evidence, names: list[str], cancelled: Callable[[], bool])
         a, b = MISTAKES[first], MISTAKES[second]
         if cancelled():
             break
-        if not a.steps.keys() & b.steps.keys() and (share := evidence.explained(b.done(a.done(evidence.guide.steps)))):
+        steps = b.done(a.done(evidence.guide.steps))
+        apart = not a.steps.keys() & b.steps.keys()
+        if apart and evidence.first.explained(steps) and (share := evidence.explained(steps)):
             found[f"{first}, and {second}"] = share
     return found
 
@@ -449,16 +452,16 @@ class _Evidence:
         some = (np.flatnonzero(which)[:_AT_FIRST] for which in (self.wrong, ~self.wrong))
         return self[np.concatenate(list(some))]
 
-    def is_changed(self, steps: Steps) -> bool:
-        """Whether the tracer of these steps draws another picture than the right one."""
-        return bool((self.guide.paint(steps, self.x, self.y) != self.right).any())
+    def drawn(self, steps: Steps) -> Array:
+        """As the tracer of these steps draws them."""
+        return self.guide.paint(steps, self.x, self.y)
 
     def explained(self, steps: Steps) -> float:
         """How much of what is wrong, or would be, is as the tracer of these steps draws it; 0 if not nearly all."""
-        return self.first._share(steps) and self._share(steps)
+        return self.share(steps, self.drawn(steps))
 
-    def _share(self, steps: Steps) -> float:
-        drawn = self.guide.paint(steps, self.x, self.y)
+    def share(self, steps: Steps, drawn: Array) -> float:
+        """`explained`, for pixels that are drawn already."""
         changed = _off(drawn, self.right)
         tells = self.guide.inside(steps, self.x, self.y) & (self.wrong | (changed > self.tolerance))
         return share_of(tells, (changed > 0) & (_off(drawn, self.found) <= self.tolerance))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from conftest import COURSE, HARD, SCENES
 
-from raytracer import METHODS, STAGES, Light, Method, Stage, interpreter, make_plan, render_scene
+from raytracer import STAGES, Light, Method, Stage, interpreter, make_plan, mistakes, render_scene
 from raytracer.compare import differences
 from raytracer.guide import LOOKS, Guide
 from raytracer.interpreter import interpret
@@ -15,10 +15,11 @@ from raytracer.mistakes import MISTAKES, recognise
 from raytracer.render import draw
 from raytracer.scene import Materials
 
-WIDTH, HEIGHT = 72, 60
+WIDTH, HEIGHT = 54, 45
 ENOUGH = 12  # wrong pixels, so that some tell
-ONLY_FULL = list(MISTAKES)[list(MISTAKES).index("no ambient colour") :]
-DIFFERENT = "colours cut off, not rounded: off by 1, which is allowed"
+FIRST_OF_FULL = list(MISTAKES).index("no ambient colour")
+AT_DIFFUSE, AT_FULL = list(MISTAKES)[:FIRST_OF_FULL], list(MISTAKES)[FIRST_OF_FULL:]
+CUT_OFF = "colours cut off, not rounded: off by 1, which is allowed"
 
 
 def drawn(scene, stage, name, width=WIDTH, height=HEIGHT):
@@ -45,19 +46,20 @@ def check_recognised(scene, stage, names):
             found = recognise(picture, scene, stage, expected=right)
             assert name in found or any(np.array_equal(drawn(scene, stage, each), picture) for each in found), name
         else:
-            assert recognise(picture, scene, stage, expected=right) in ((), (DIFFERENT,)), name
+            assert recognise(picture, scene, stage, expected=right) in ((), (CUT_OFF,), (name,)), name
 
 
 def test_each_mistake_is_recognised_at_diffuse(course_scene_path):
-    check_recognised(interpreter(course_scene_path), "diffuse", MISTAKES)
+    check_recognised(interpreter(course_scene_path), "diffuse", AT_DIFFUSE)
 
 
-@pytest.mark.parametrize("scene", ["03_shiny_sphere", "07_colorful_lights", "09_mirror_spheres"])
+@pytest.mark.parametrize("scene", ["03_shiny_sphere", "07_colorful_lights", "08_reflective_sphere"])
 def test_each_mistake_is_recognised_at_full(scene):
-    check_recognised(interpreter(SCENES / f"{scene}.cli"), "full", [*ONLY_FULL, "normals inwards", "upside down"])
+    check_recognised(interpreter(SCENES / f"{scene}.cli"), "full", [*AT_FULL, "normals inwards", "upside down"])
 
 
 SHADE = """
+fov 50
 background .1 .2 .3
 light 3 4 0  .8 .2 .2
 light -3 4 2  .2 .7 .3
@@ -126,6 +128,9 @@ ELSEWHERE = {
         replace(s, camera=replace(s.camera, w=tuple(-x for x in s.camera.w)))
     ),
     "eye taken as 0 0 0": lambda s: picture_of(replace(s, camera=replace(s.camera, eye=(0, 0, 0)))),
+    "tan(fov) in place of tan(fov / 2)": lambda s: picture_of(replace(s, camera=replace(s.camera, fov=100))),
+    "tan(fov / 2) in place of 1 / tan(fov / 2)": lambda s: picture_of(replace(s, camera=replace(s.camera, fov=130))),
+    "d = 1, whatever fov is": lambda s: picture_of(replace(s, camera=replace(s.camera, fov=90))),
     "V negated": lambda s: picture_of(replace(s, camera=replace(s.camera, v=tuple(-x for x in s.camera.v)))),
     "far root taken": lambda s: picture_of(s, method=usual(far_root)),
     "hits from inside missed": lambda s: picture_of(s, method=usual(near_root)),
@@ -138,7 +143,7 @@ ELSEWHERE = {
     "diffuse + light · max(0, N·L)": lambda s: picture_of(s, shaded(lambda d, i, c: d + i * c)),
     "diffuse · light + max(0, N·L)": lambda s: picture_of(s, shaded(lambda d, i, c: d * i + c)),
     "(diffuse + light) · max(0, N·L)": lambda s: picture_of(s, shaded(lambda d, i, c: (d + i) * c)),
-    DIFFERENT: lambda s: picture_of(
+    CUT_OFF: lambda s: picture_of(
         s, replace(STAGES["diffuse"], painter="", colours=lambda b: STAGES["diffuse"].colours(b) - 0.5 / 255)
     ),
 }
@@ -158,10 +163,10 @@ def test_mistakes_that_are_made_elsewhere_are_recognised(name, outside):
         SHADE if not outside else "eye .3 .2 1\nuvw 0 1 0 -1 0 0 0 0 1\n" + SHADE.replace("sphere 30", "#")
     )
     right, picture = picture_of(scene), np.ascontiguousarray(ELSEWHERE[name](scene))
-    if np.count_nonzero(differences(picture, right) > (name != DIFFERENT)) > ENOUGH:
+    if np.count_nonzero(differences(picture, right) > (name != CUT_OFF)) > ENOUGH:
         assert recognise(picture, scene)[0] == name
     else:
-        assert outside or name in ("uvw ignored", "eye taken as 0 0 0")
+        assert outside or name in ("uvw ignored", "eye taken as 0 0 0", "background black")
         assert recognise(picture, scene) == ()
 
 
@@ -193,22 +198,31 @@ def test_with_rays_through_centres_the_corners_are_the_mistake():
     assert recognise(picture_of(scene, sampling="centre"), scene, sampling="centre") == ()
 
 
-def test_a_few_stray_pixels_do_not_hide_a_mistake():
-    scene = interpret(SHADE)
-    picture = picture_of(scene, sampling="centre").copy()
-    picture[40, 40:44] = 255
-    assert recognise(picture, scene) == ("rays through the pixels' centres",)
+def test_a_few_stray_pixels_do_not_hide_a_mistake_and_many_do():
+    """Two of the hundred wrong ones on the outline: more than one in a hundred, but tangent rays may be."""
+    scene = interpreter(SCENES / "01_one_sphere.cli")
+    picture = render_scene(scene, "hit", 96, 96, sampling="centre")
+    assert 60 < np.count_nonzero(differences(picture, render_scene(scene, "hit", 96, 96))) < 180
+    for strays, found in ((2, ("rays through the pixels' centres",)), (60, ())):
+        picture[90, 10 : 10 + strays] = 255
+        assert recognise(picture, scene, "hit") == found
+
+
+def test_what_explains_nearly_as_much_is_not_named():
+    scene = interpreter(SCENES / "05_one_triangle.cli")
+    assert recognise(np.flipud(render_scene(scene)).copy(), scene) == ("upside down",)
 
 
 @pytest.mark.parametrize("stage", ["diffuse", "full"])
-def test_other_pictures_show_no_mistake(stage):
+def test_other_pictures_show_no_mistake(stage, monkeypatch):
     """Noise, another scene, another stage, half of the picture missing."""
+    monkeypatch.setattr(mistakes, "_SECONDS", 0.7)
     random = np.random.default_rng(5)
     scene, other = (interpreter(SCENES / f"{name}.cli") for name in ("09_mirror_spheres", "04_many_spheres"))
     right = render_scene(scene, stage, WIDTH, HEIGHT)
     noisy = np.clip(right + random.normal(0, 5, right.shape), 0, 255).astype(np.uint8)
     half = right.copy()
-    half[:30] = 0
+    half[:, :20] = 0
     assert recognise(right, scene, stage) == ()
     for picture in (
         noisy,
@@ -221,10 +235,11 @@ def test_other_pictures_show_no_mistake(stage):
 
 
 @pytest.mark.parametrize("path", HARD, ids=lambda path: path.stem)
-def test_what_rounding_makes_wrong_is_no_mistake(path):
+def test_what_rounding_makes_wrong_is_no_mistake(path, monkeypatch):
+    monkeypatch.setattr(mistakes, "_SECONDS", 0.2)
     scene = interpreter(path)
     right = render_scene(scene, "diffuse", WIDTH, HEIGHT)
-    for method in METHODS:
+    for method in ("textbook", "textbook32", "haines32"):
         found = recognise(render_scene(scene, "diffuse", WIDTH, HEIGHT, method=method), scene, expected=right)
         assert not found or found[0] in ("nothing is hit", "the lights add nothing"), method
 
