@@ -125,8 +125,7 @@ def to_next_lens(view: View, key: str) -> View:
     if not view.has_own:
         return replace(view, lens=OWN, note="this is the reference: plug in a file, or take another method with m")
     names = list(LENSES)
-    lens = names[(names.index(view.lens) + 1) % len(names)]
-    return replace(view, lens=lens, note=f"{lens}: {LENSES[lens]}")
+    return replace(view, lens=names[(names.index(view.lens) + 1) % len(names)])
 
 
 def to_file_view(view: View, key: str) -> View:
@@ -145,12 +144,13 @@ def read_again(view: View, key: str) -> View:
 
 
 def saved(view: View, path: Path) -> View:
-    """The view when a file has been saved, replaced or removed by somebody."""
+    """The view when a file has been saved, replaced or removed by somebody: a pixel's story is one of the past."""
+    view = _bare(view)
     if path == view.scene:
         view = replace(view, readings=view.readings + 1)
     if path == view.plug:
         view = replace(view, plug_readings=view.plug_readings + 1)
-    return replace(view, wish="")
+    return view
 
 
 def save(view: View, key: str) -> View:

@@ -21,7 +21,7 @@ from raytracer import METHODS
 from raytracer.image import to_bytes
 from raytracer.methods import CERTIFIED
 from raytracer.plug import PlugError
-from sketch.controls import DIFFERENCE, KEYS, MOUSE, OWN, WIPE, Place, View
+from sketch.controls import DIFFERENCE, KEYS, LENSES, MOUSE, OWN, WIPE, Place, View
 from sketch.rays import Ink
 from sketch.worker import Drawing, Reference
 
@@ -106,7 +106,7 @@ def status(view: View, drawing: Drawing | None, size: int, frames_a_second: floa
     elif drawing.moving:
         time = _pace(drawing, frames_a_second)
     else:
-        time = f"{drawing.milliseconds:.1f} ms" if drawing.whole else f"drawing, {drawing.done:.0%}"
+        time = _time(drawing.milliseconds) if drawing.whole else f"drawing, {drawing.done:.0%}"
     how = view.stage if view.method == CERTIFIED else f"{view.stage} · {view.method}"
     if view.samples_of_stage != 1:
         how += f" · {view.samples} samples"
@@ -115,6 +115,10 @@ def status(view: View, drawing: Drawing | None, size: int, frames_a_second: floa
     figures = f"{view.place + 1} of {len(view.scenes)} · {how} · {size} × {size} · {time}"
     path = "" if drawing is None else drawing.parts or (drawing.path and f"{drawing.path} path")
     return Status(view.scene.stem, figures, *_remark(view, drawing), path)
+
+
+def _time(milliseconds: float) -> str:
+    return f"{milliseconds:.1f} ms" if milliseconds < 1000 else f"{milliseconds / 1000:.1f} s"
 
 
 def _pace(drawing: Drawing, frames_a_second: float | None) -> str:
@@ -134,8 +138,9 @@ def _remark(view: View, drawing: Drawing | None) -> tuple[str, Colour]:
     """The second line: the answer to the last key, else warnings and wrong pixels, else what the method is."""
     if view.note:
         return view.note, BRIGHT
-    if view.lens != OWN and drawing is not None and drawing.reference is not None:
-        return _verdict(drawing.reference)
+    if view.lens != OWN:
+        reference = None if drawing is None else drawing.reference
+        return (LENSES[view.lens], DIM) if reference is None else _verdict(reference)
     if drawing is not None and (drawing.wrong or drawing.warnings):
         wrong = [f"{drawing.wrong:,} of {drawing.picture[..., 0].size:,} pixels are wrong"] if drawing.wrong else []
         return "; ".join([*wrong, *drawing.warnings]), AMBER
@@ -145,12 +150,11 @@ def _remark(view: View, drawing: Drawing | None) -> tuple[str, Colour]:
 
 
 def _verdict(reference: Reference) -> tuple[str, Colour]:
-    """How far the picture is from the reference, and why, if that is known."""
+    """How far the picture is from the reference."""
     found = reference.comparison
     if not found.wrong:
         return ("no pixel differs" if not found.largest else "no pixel differs by more than 1"), DIM
-    figures = f"{found.wrong:,} of {found.pixels:,} pixels are wrong, by up to {found.largest}"
-    return "; ".join([figures, *(f"looks like: {cause}" for cause in reference.causes)]), AMBER
+    return f"{found.wrong:,} of {found.pixels:,} pixels are wrong, by up to {found.largest}", AMBER
 
 
 def through_lens(view: View, drawing: Drawing) -> np.ndarray:
@@ -168,6 +172,11 @@ def through_lens(view: View, drawing: Drawing) -> np.ndarray:
 
 def help_panel() -> Panel:
     return Panel("Keys and mouse", (*((row.label, row.does) for row in KEYS), *MOUSE))
+
+
+def causes_panel(causes: tuple[str, ...]) -> Panel:
+    """Why a picture is not as it ought to be."""
+    return Panel("This looks like", tuple(("", cause) for cause in causes), AMBER, 15, is_banner=True)
 
 
 def error_panel(drawing: Drawing) -> Panel:

@@ -21,7 +21,18 @@ from sketch import controls
 from sketch.controls import DIFFERENCE, OWN, WIPE, View
 from sketch.files import save_beside
 from sketch.orbit import seen_from
-from sketch.overlay import Layout, Legend, Panel, compose, error_panel, help_panel, status, story_panel, through_lens
+from sketch.overlay import (
+    Layout,
+    Legend,
+    Panel,
+    causes_panel,
+    compose,
+    error_panel,
+    help_panel,
+    status,
+    story_panel,
+    through_lens,
+)
 from sketch.pace import FrameRate
 from sketch.rays import Ink, ink_of, lines_of
 from sketch.watch import Watcher
@@ -99,7 +110,7 @@ class Session:
         self._count(drawing)
         picture = np.full((size, size, 3), BLANK, np.uint8) if drawing is None else through_lens(view, drawing)
         panel = self._panel(view, drawing)
-        legend = () if panel is not None else self._legend(view, drawing)
+        legend = () if panel is not None and not panel.is_banner else self._legend(view, drawing)
         lines = status(view, drawing, size, self._frames.a_second)
         story = self._told(view)
         return compose(self.layout, picture, lines, panel, view.pixel, legend, story and story.ink, out)
@@ -160,6 +171,9 @@ class Session:
             return story_panel(story.lines, over_rays=story.ink is not None)
         if drawing is not None and drawing.error:
             return error_panel(drawing)
+        reference = None if drawing is None else drawing.reference
+        if reference is not None and reference.causes and view.legend and view.lens in (DIFFERENCE, WIPE):
+            return causes_panel(reference.causes)
         return None
 
     def _told(self, view: View) -> Story | None:
@@ -202,9 +216,16 @@ class Session:
             size, stage, method = request.size, request.stage, request.method
             told = probe_pixel(drawing.scene, *pixel, size, size, stage, method=method)
             lines = lines_of(told.rays, make_raster(drawing.scene.camera, size, size))
-            self._story = Story(pixel, tuple(told.lines()), ink_of(lines, size, size) if told.rays else None)
-            print(*told.story(), sep="\n", flush=True)  # noqa: T201 (a click prints)
+            own = self._own(drawing, pixel)
+            self._story = Story(pixel, (*told.lines(), *own), ink_of(lines, size, size) if told.rays else None)
+            print(*told.story(), *own, sep="\n", flush=True)  # noqa: T201 (a click prints)
         return ""
+
+    @staticmethod
+    def _own(drawing: Drawing, pixel: tuple[int, int]) -> list[str]:
+        """What a plugged file has made of a pixel."""
+        red, green, blue = drawing.picture[pixel[1], pixel[0]].tolist()
+        return [f"{drawing.parts.partition(':')[0]} drew ({red}, {green}, {blue})"] if drawing.parts else []
 
     def _save(self, request: Request) -> str:
         """Save what was seen, or on its way, when the key was pressed."""

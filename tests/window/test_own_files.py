@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,9 @@ from window_driver import Sketch
 
 from raytracer import interpreter, load_png, render_scene
 from raytracer.compare import DIFFERENCES_LEGEND, difference_picture
-from sketch.overlay import Layout, Status, compose
+from raytracer.mistakes import recognise
+from raytracer.plug import Order, draw_plugged, load_plug
+from sketch.overlay import Layout, Status, causes_panel, compose
 
 SIZE = 330
 SCENE = "background 0 0 .5\nsurface 1 0 0  0 0 0  0 0 0  1 0\nlight 0 5 5  1 1 1\nsphere 1 0 0 -4\n"
@@ -132,3 +135,24 @@ def test_the_window_closes_while_a_plugged_file_draws(start, scene, tmp_path):
     while child.exists() and (child / "stat").read_text().split()[2] != "Z":
         assert time.monotonic() < end
         time.sleep(0.05)
+
+
+def test_the_usual_mistake_is_named_and_gone_when_it_is_mended(start, scene, tmp_path):
+    """What a newcomer does: the printed template, a slip, key v, the cause, the slip mended, nothing differs."""
+    right = resources.files("raytracer").joinpath("templates", "stage.py").read_text("utf-8")
+    slip = right.replace("total * block.diffuse", "total + block.diffuse")
+    mine = tmp_path / "mine.py"
+    mine.write_text(slip)
+    size = 100  # numpy is quick
+    sketch = start(scene, "--size", size, "--plug", mine)
+    picture = draw_plugged(load_plug(mine), Order(interpreter(scene), "diffuse", size, size))
+    layout, nothing = Layout(size), np.zeros((size, size, 3), np.uint8)
+    causes = recognise(picture, interpreter(scene), "diffuse")
+    assert any("+" in cause for cause in causes)
+    seen = difference_picture(picture, render_scene(interpreter(scene), "diffuse", size, size))
+    panel = compose(layout, seen, Status("", "", ""), causes_panel(causes), legend=DIFFERENCES_LEGEND)
+    sketch.press("v", "v")
+    sketch.wait_for_picture(panel[: layout.side], "the cause")
+    mine.write_text(right)
+    same = compose(layout, nothing, Status("", "", ""), legend=DIFFERENCES_LEGEND)
+    sketch.wait_for_picture(same[: layout.side], "no difference and no cause")
