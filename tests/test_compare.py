@@ -1,7 +1,6 @@
 """Two pictures compared, and the command that does it."""
 
 import json
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -11,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from optional import optional
 
 from raytracer import interpreter, load_png, render_scene, save_png
 from raytracer.__main__ import main
@@ -88,8 +88,7 @@ def test_what_cannot_be_compared_is_refused(found, message):
 
 
 def test_flip_is_0_for_equal_pictures_and_grows():
-    if os.environ.get("REQUIRE_OPTIONAL") != "1":
-        pytest.importorskip("flip_evaluator")
+    optional("flip_evaluator")
     picture = np.full((32, 32, 3), 100, np.uint8)
     little, much = (mean_flip(np.full_like(picture, byte), picture) for byte in (110, 200))
     assert mean_flip(picture, picture) == 0
