@@ -17,7 +17,7 @@ from raytracer.compare import differences
 from raytracer.course import hits_of_rays, hits_one_by_one
 from raytracer.families import FAMILIES, Bundle, bundles
 from raytracer.interpreter import SceneError, interpreter
-from raytracer.mistakes import recognise
+from raytracer.mistakes import advice, recognise
 from raytracer.plan import make_plan
 from raytracer.plug import Order, Plug, PlugError, blaming, draw_plugged, method_of
 from raytracer.probe import probe_pixel
@@ -144,7 +144,8 @@ def _colours(plug: Plug, path: Path, scene: Scene, size: int) -> Iterator[Result
     own_hits = "render_scene" in plug.functions
     result = _result("colour", path, scene, mask, lambda x, y: f"{_listed(found[y, x])}", plug.stage, own_hits)
     causes = recognise(found, scene, plug.stage, expected=expected) if mask.any() else ()
-    yield replace(result, story=(*result.story, *(f"looks like: {cause}" for cause in causes)))
+    named = (f"looks like: {cause}; instead: {'; '.join(advice(cause))}" for cause in causes)
+    yield replace(result, story=(*result.story, *named))
 
 
 def _result(

@@ -352,6 +352,11 @@ MISTAKES = {
 }
 
 
+def advice(cause: str) -> tuple[str, ...]:
+    """What to do instead: a line for each mistake that a name `recognise` gives is of."""
+    return tuple(MISTAKES[name].instead for name in cause.split(", and ") if name in MISTAKES)
+
+
 def recognise(
     picture: np.ndarray,
     scene: Scene,

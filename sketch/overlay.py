@@ -20,6 +20,7 @@ from PIL import Image, ImageDraw, ImageFont
 from raytracer import METHODS
 from raytracer.image import to_bytes
 from raytracer.methods import CERTIFIED
+from raytracer.mistakes import advice
 from raytracer.plug import PlugError
 from sketch.controls import DIFFERENCE, KEYS, LENSES, MOUSE, OWN, WIPE, Place, View
 from sketch.rays import Ink
@@ -176,7 +177,9 @@ def help_panel() -> Panel:
 
 def causes_panel(causes: tuple[str, ...]) -> Panel:
     """Why a picture is not as it ought to be."""
-    return Panel("This looks like", tuple(("", cause) for cause in causes), AMBER, 15, is_banner=True)
+    lines = ((cause, *(f"    instead: {line}" for line in advice(cause))) for cause in causes)
+    rows = tuple(("", line) for line in chain.from_iterable(lines))
+    return Panel("This looks like", rows, AMBER, 15, is_banner=True)
 
 
 def error_panel(drawing: Drawing) -> Panel:
