@@ -175,7 +175,7 @@ def _cluster(address: str) -> Iterator[Crew]:
                 client.wait_for_workers(1, timeout=_PATIENCE)
             except TimeoutError:
                 raise CrewError(f"{address}: no worker has come within {_PATIENCE} s") from None
-            yield Crew(client.get_executor(), lambda: sum(client.nthreads().values()))
+            yield Crew(client.get_executor(pure=False), lambda: sum(client.nthreads().values()))
     finally:
         if here is not None:
             here.close()

@@ -221,9 +221,7 @@ def _paint_whole(plan: Plan, screen: Screen, picture: np.ndarray, watch: Watch) 
     screen.settle(Hits(t, index), 0, *range(len(screen.desks)))
     if screen.unit:
         np.ldexp(t, screen.unit, out=t)  # in the scene's own unit some may be too small or too large for a float64
-    painter, (near, far) = getattr(plan.path, plan.painter), screen.range_of(t, index)
-    if plan.reach is not None:
-        near, far = np.ldexp(plan.reach, -screen.unit).tolist()
+    painter, (near, far) = getattr(plan.path, plan.painter), plan.reach or screen.range_of(t, index)
     share_bands(screen, plan, watch, paint)
 
 

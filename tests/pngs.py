@@ -8,7 +8,11 @@ import numpy as np
 
 def read_png(path):
     """uint8 or uint16 (height, width, 3)."""
-    data = path.read_bytes()
+    return decode_png(path.read_bytes())
+
+
+def decode_png(data):
+    """The same of a file's bytes."""
     assert data[:8] == b"\x89PNG\r\n\x1a\n"
     chunks, place = [], 8
     while place < len(data):

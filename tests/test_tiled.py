@@ -33,6 +33,7 @@ SPHERES = interpreter(ROOT / "scenes" / "04_many_spheres.cli")
 MIRRORS = interpreter(ROOT / "scenes" / "09_mirror_spheres.cli")
 STAR = interpreter(ROOT / "scenes" / "11_star.cli")
 TANGENT = interpreter(next((ROOT / "scenes" / "hard").glob("*tangent*.cli")))
+HUGE = interpreter(next((ROOT / "scenes" / "hard").glob("*huge*.cli")))  # counted in a unit of its own
 
 
 @pytest.fixture
@@ -61,7 +62,7 @@ def test_rows_drawn_on_their_own_are_those_of_the_picture(path, stage, first, se
 @pytest.mark.parametrize("stage", STAGES)
 @pytest.mark.parametrize("depth", [Depth.BYTE, Depth.WORD])
 def test_a_picture_in_bands_is_the_picture(stage, depth, tmp_path, small_bands):
-    for scene in (SPHERES, STAR):
+    for scene in (SPHERES, STAR, HUGE):
         picture = Picture(Cargo(scene), stage, 100, 150, depth=depth)
         assert len(picture.bands()) == 3
         with open_crew(threads=2) as crew:
