@@ -13,7 +13,7 @@ from random import Random
 import numpy as np
 import pytest
 
-from raytracer import STAGES, Scene, SceneError, backend, camera, plain, render, screen
+from raytracer import STAGES, Scene, SceneError, backend, camera, plain, screen
 from raytracer.interpreter import interpret
 from raytracer.methods import CERTIFIED, METHODS
 from raytracer.plan import Plan, make_plan
@@ -160,7 +160,7 @@ def other_bands() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(screen, "_BAND_PIXELS", 1)
         patch.setattr(camera, "BAND_PIXELS", 7)
-        patch.setattr(render, "_PIECES", 5)
+        patch.setattr(screen, "_PIXELS_A_MOMENT", 1)
         yield
 
 

@@ -41,7 +41,7 @@ def test_a_process_killed_while_it_saves_leaves_the_old_picture(tmp_path):
         f"save_png({str(out)!r}, np.random.default_rng(2).integers(0, 256, (4000, 4000, 3), np.uint8))"
     )
     process = subprocess.Popen([sys.executable, "-c", program], cwd=ROOT, stdout=subprocess.PIPE)
-    while process.poll() is None and not list(tmp_path.glob(".out.png.*.part")):
+    while process.poll() is None and not list(tmp_path.glob(".out.png.*.part.png")):
         time.sleep(0.001)
     process.kill()
     process.wait(20)
@@ -51,10 +51,10 @@ def test_a_process_killed_while_it_saves_leaves_the_old_picture(tmp_path):
     save_png(out, PICTURE)
     assert draft.exists()  # it might still be written to
     os.utime(draft, (time.time() - 2 * image._STALE,) * 2)
-    (tmp_path / ".other.png.0123456789abcdef.part").touch()
-    os.utime(tmp_path / ".other.png.0123456789abcdef.part", (0, 0))
+    (tmp_path / ".other.png.0123456789abcdef.part.png").touch()
+    os.utime(tmp_path / ".other.png.0123456789abcdef.part.png", (0, 0))
     save_png(out, PICTURE)
-    assert sorted(path.name for path in tmp_path.iterdir()) == [".other.png.0123456789abcdef.part", "out.png"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == [".other.png.0123456789abcdef.part.png", "out.png"]
 
 
 @posix
@@ -78,11 +78,11 @@ def test_a_full_device_leaves_the_old_picture(tmp_path, monkeypatch):
     out = tmp_path / "out.png"
     save_png(out, PICTURE)
 
-    def full(picture, file):
+    def full(file, picture):
         file.write(b"half")
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr(image, "_encode", full)
+    monkeypatch.setattr(image, "encode_png", full)
     with pytest.raises(OSError, match="No space left") as caught:
         save_png(out, PICTURE[::-1])
     assert caught.value.filename == str(out)
