@@ -19,7 +19,7 @@ from raytracer.camera import SAMPLINGS
 from raytracer.image import Depth, check_can_save
 from raytracer.methods import CERTIFIED, METHODS
 from raytracer.plug import Order, PlugError
-from raytracer.plug_process import PATIENCE, PlugRunner, plugged_file, seconds
+from raytracer.plug_process import PATIENCE, PlugRunner, echo, plugged_file, seconds
 from raytracer.render import Progress
 from raytracer.samples import SAMPLES, Samples
 from raytracer.stages import STAGES
@@ -64,7 +64,7 @@ def _by_plug(arguments: argparse.Namespace, scene: Scene) -> np.ndarray | None:
     """The picture by a plugged file; None if none of its functions has a part in it."""
     width, height = arguments.size
     order = Order(scene, arguments.stage, width, height, arguments.sampling, arguments.method)
-    with closing(PlugRunner(arguments.plug, arguments.patience, print)) as runner:
+    with closing(PlugRunner(arguments.plug, arguments.patience, echo)) as runner:
         picture, names = runner.draw(order, cancelled=interrupts.came)
     if not names:
         print(f"{arguments.plug}: has no part in stage {arguments.stage}", file=sys.stderr)
@@ -81,7 +81,7 @@ def test(arguments: argparse.Namespace) -> int:
         raise ValueError(f"{arguments.scenes}: found no scene (.cli), expected a folder of some")
     hard = sorted((arguments.scenes / HARD).glob("*.cli"))
     with (
-        closing(PlugRunner(arguments.plug, arguments.patience, print)) as runner,
+        closing(PlugRunner(arguments.plug, arguments.patience, echo)) as runner,
         tqdm(bar_format="{desc}", leave=False, disable=None) as line,
     ):
 

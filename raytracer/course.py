@@ -36,7 +36,9 @@ class WrongResultError(Exception):
     """A function has returned what it should not."""
 
     def __init__(self, function: Callable[..., Any], found: object, expected: str) -> None:
-        super().__init__(f"{function.__name__} returned {_shortened(found)}, expected {expected}")
+        super().__init__(
+            f"{getattr(function, '__name__', 'the function')} returned {_shortened(found)}, expected {expected}"
+        )
         self.function = function
 
 
@@ -178,7 +180,7 @@ class _Loop:
             return directions_of(grid, grid.across[xs], grid.up[ys])
         size = raster.width, raster.height
         found = [
-            _three(ask, ask(raster.camera, x, y, *size), "a direction, three numbers")
+            three_numbers(ask, ask(raster.camera, x, y, *size), "a direction, three numbers")
             for y, x in zip(ys.tolist(), xs.tolist(), strict=True)
         ]
         x, y, z = np.array(found).T
@@ -254,10 +256,10 @@ def normal_of(shape: Shape, point: Vector, ray: Ray) -> Vector:
 
 def colour_of(function: Callable[..., Any], found: object) -> Vector:
     """What a function has returned, as a colour."""
-    return _three(function, found, "a colour, three numbers from 0 to 1")
+    return three_numbers(function, found, "a colour, three numbers from 0 to 1")
 
 
-def _three(function: Callable[..., Any], found: Any, expected: str) -> Vector:
+def three_numbers(function: Callable[..., Any], found: Any, expected: str) -> Vector:
     try:
         x, y, z = found
         return float(x), float(y), float(z)

@@ -14,7 +14,7 @@ import numpy as np
 
 from raytracer.arrays import Hits
 from raytracer.compare import differences
-from raytracer.course import hits_of_rays, hits_one_by_one
+from raytracer.course import hits_of_rays, hits_one_by_one, three_numbers
 from raytracer.families import FAMILIES, Bundle, bundles
 from raytracer.interpreter import SceneError, interpreter
 from raytracer.mistakes import advice, recognise
@@ -97,14 +97,14 @@ def _read(path: Path) -> Scene:
 
 def _rays(plug: Plug, path: Path, scene: Scene, size: int) -> Iterator[Result]:
     """A picture that is not square tells which side is which."""
-    width, height, ask = size, size * 2 // 3, plug.functions["eye_ray"]
+    width, height, ask = size, max(1, size * 2 // 3), plug.functions["eye_ray"]
     raster, wrong = make_plan(scene, "hit", width, height).raster, 0
     story: tuple[str, ...] = ()
     for y, x in np.ndindex(height, width):
         true = np.array(raster.exact_direction(x, y), float)
         with blaming(plug.path, f"asked for pixel {x} {y}"):
-            found = np.array([float(component) for component in ask(scene.camera, x, y, width, height)])
-        if found.shape != (3,) or not np.allclose(_unit(found), _unit(true), rtol=0, atol=1e-9):
+            found = np.array(three_numbers(ask, ask(scene.camera, x, y, width, height), "a direction, three numbers"))
+        if not np.allclose(_unit(found), _unit(true), rtol=0, atol=1e-9):
             wrong += 1
             story = story or (
                 f"pixel {x} {y} of {width} x {height}: the ray goes along {_listed(true)}",

@@ -54,6 +54,8 @@ class FileError(ValueError):
 
 def line_of(path: Path, number: int) -> str | None:
     """A line of a text file, counted from 1, without its end; None where it cannot be read."""
+    if number < 1:
+        return None
     try:
         if not stat.S_ISREG(path.stat().st_mode):  # a pipe or a device might never answer
             return None

@@ -6,7 +6,9 @@ own code: see `raytracer.plug_process`, which does that where it can be given up
 
 from __future__ import annotations
 
+import codecs
 import sys
+import sysconfig
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -20,7 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from raytracer.course import WrongResultError, draw_one_by_one
-from raytracer.faults import FileError
+from raytracer.faults import FileError, line_of
 from raytracer.image import to_bytes
 from raytracer.methods import CERTIFIED, Limits, Method
 from raytracer.plan import Plan, make_plan
@@ -90,6 +92,8 @@ def load_plug(path: Path) -> Plug:
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else str(error)
         raise PlugError(path, None, None, f"found no readable file, expected Python ({reason})") from error
+    if source.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):  # as a shell of Windows writes what is printed
+        source = source.decode("utf-16", "replace").encode()
     module = ModuleType(f"plugged_{path.stem}")
     module.__file__ = str(path)
     sys.modules[module.__name__] = module  # where dataclasses look for their module
@@ -220,7 +224,8 @@ def blaming(path: Path, when: str) -> Iterator[None]:
         raise PlugError(path, line, None, str(error)) from error
     except SyntaxError as error:
         where = Path(error.filename) if error.filename else path
-        raise PlugError(where, error.lineno, error.offset, f"{type(error).__name__}: {error.msg}") from error
+        line, column = (number if number and number > 0 else None for number in (error.lineno, error.offset))
+        raise PlugError(where, line, column, f"{type(error).__name__}: {error.msg}") from error
     except (Exception, SystemExit) as error:
         raise _fault_of(error, path, when) from error
 
@@ -235,17 +240,22 @@ def _fault_of(error: BaseException, path: Path, when: str) -> PlugError:
 
 def _last_place(trace: TracebackType | None, folder: Path) -> tuple[Path, int | None, int | None] | None:
     """The innermost place in a file of this folder, packages that are installed in it left out."""
-    places = [frame for frame in traceback.extract_tb(trace) if _is_own(frame.filename, folder)]
+    places = [frame for frame in traceback.extract_tb(trace) if is_own(frame.filename, folder)]
     if not places:
         return None
     last = places[-1]
-    return Path(last.filename), last.lineno, None if last.colno is None else last.colno + 1
+    file, line = Path(last.filename), line_of(Path(last.filename), last.lineno or 0)
+    if last.colno is None or line is None:
+        return file, last.lineno, None
+    return file, last.lineno, len(line.encode()[: last.colno].decode(errors="ignore")) + 1  # colno counts bytes
 
 
-def _is_own(filename: str, folder: Path) -> bool:
-    path = Path(filename)
-    return folder in path.resolve().parents and "site-packages" not in path.parts and not _is_ours(path)
-
-
-def _is_ours(path: Path) -> bool:
-    return Path(__file__).resolve().parent in path.resolve().parents
+def is_own(filename: str, folder: Path) -> bool:
+    """Whether a file is the user's own: in this folder, and not Python's, a package's or the tracer's."""
+    path = Path(filename).resolve()
+    others = [Path(__file__).parent, *(Path(sysconfig.get_path(name)) for name in ("stdlib", "platstdlib", "purelib"))]
+    return (
+        not filename.startswith("<")
+        and folder in path.parents
+        and not any(other.resolve() in path.parents for other in others)
+    )

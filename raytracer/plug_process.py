@@ -9,6 +9,7 @@ has everything but the file loaded.
 from __future__ import annotations
 
 import argparse
+import ctypes
 import io
 import os
 import pickle
@@ -18,7 +19,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -26,7 +27,7 @@ from typing import IO, Any
 
 import numpy as np
 
-from raytracer.plug import Order, Plug, PlugError, draw_plugged, load_plug
+from raytracer.plug import Order, Plug, PlugError, draw_plugged, is_own, load_plug
 from raytracer.render import Cancelled
 
 PATIENCE = 60.0  # seconds without a sign of life after which a picture is given up
@@ -38,6 +39,16 @@ _OFTEN = 0.05  # seconds from one message about the picture to the next
 Tell = Callable[..., object]  # see `draw_plugged` and `exam.examine`
 Names = tuple[str, ...]
 Say = Callable[[str], object]
+
+
+def echo(line: str) -> None:
+    """Write a line to the standard output, whatever it holds, and whether or not anybody reads."""
+    if sys.stdout is None:  # a program without a terminal, on Windows
+        return
+    encoding = getattr(sys.stdout, "encoding", None) or "utf-8"
+    with suppress(OSError, ValueError):
+        sys.stdout.write(line.encode(encoding, "backslashreplace").decode(encoding) + "\n")
+        sys.stdout.flush()
 
 
 def plugged_file(text: str) -> Path:
@@ -66,6 +77,7 @@ class PlugRunner:
     patience: float = PATIENCE
     say: Say = lambda line: None
     ahead: bool = False  # whether the next process is started before it is needed
+    files: tuple[Path, ...] = ()  # the plugged file and the modules of one's own that it has last imported
     _spare: _Child | None = field(default=None, init=False)
     _busy: _Child | None = field(default=None, init=False)
     _closed: bool = field(default=False, init=False)
@@ -110,29 +122,34 @@ class PlugRunner:
                 child.kill()
 
     def _follow(self, child: _Child, tell: Tell, cancelled: Callable[[], bool]) -> Any:
-        heard = time.monotonic()
-        while True:
-            if cancelled() or self._closed:
-                raise Cancelled
-            try:
-                kind, content = child.messages.get(timeout=_LOOK)
-            except queue.Empty:
-                if time.monotonic() - heard > self.patience:
-                    message = f"no sign of life for {self.patience:g} seconds: given up (does it loop for ever?)"
-                    raise PlugError(self.path, None, None, message) from None
-                continue
-            if kind == "print":  # which is no sign of life: a loop may print for ever
-                self.say(content)
-                continue
-            heard = time.monotonic()
+        for kind, content in self._messages(child, lambda: self._closed or cancelled()):
+            if kind == "done":
+                return content
             if kind == "news":
                 tell(*content)
-            elif kind == "done":
-                return content
+            elif kind == "print":
+                self.say(content)
+            elif kind == "files":
+                self.files = content
             elif kind == "fault":
                 raise PlugError(*content)
+            elif kind == "refusal":
+                raise PlugError(self.path, None, None, content)
             elif not self._closed:
                 raise PlugError(self.path, None, None, f"ended before it was done: {child.epitaph()}")
+        raise Cancelled
+
+    def _messages(self, child: _Child, cancelled: Callable[[], bool]) -> Iterator[tuple[str, Any]]:
+        """What the child says, until that is not wanted any more. Prints are no sign of life: a loop may print."""
+        heard = time.monotonic()
+        while not cancelled():
+            with suppress(queue.Empty):
+                message = child.messages.get(timeout=_LOOK)
+                heard = heard if message[0] == "print" else time.monotonic()
+                yield message
+            if time.monotonic() - heard > self.patience:
+                text = f"no sign of life for {self.patience:g} seconds: given up (does it loop for ever?)"
+                raise PlugError(self.path, None, None, text)
 
 
 class _Child:
@@ -158,17 +175,23 @@ class _Child:
             self._process.stdin.flush()  # and stays open: when this process ends, the child sees it
 
     def kill(self) -> None:
+        """End it, and whatever it has started."""
         self._dead.set()
+        self._wait()
+        with suppress(OSError):  # what was not written any more
+            assert self._process.stdin is not None
+            self._process.stdin.close()
+
+    def _wait(self) -> int:
+        if self._process.returncode is None and hasattr(os, "killpg"):
+            with suppress(ProcessLookupError, PermissionError):
+                os.killpg(self._process.pid, signal.SIGKILL)
         self._process.kill()
-        self._process.wait()
-        for pipe in (self._process.stdin, self._process.stdout):
-            if pipe is not None:
-                with suppress(OSError):  # what was not written any more
-                    pipe.close()
+        return self._process.wait()
 
     def epitaph(self) -> str:
         """How it ended."""
-        status = self._process.wait()
+        status = self._wait()
         return f"killed by {signal.Signals(-status).name}" if status < 0 else f"exit status {status}"
 
     def _listen(self) -> None:
@@ -182,6 +205,8 @@ class _Child:
                 with suppress(queue.Full):
                     self.messages.put(message, timeout=1)
                     break
+        assert self._process.stdout is not None
+        self._process.stdout.close()  # here, since who closes it elsewhere waits for what is read here
 
 
 # ---------------------------------------------------------------------------------------------- within the process
@@ -191,16 +216,27 @@ def serve() -> None:
     """Do one task and end."""
     channel, orders = os.fdopen(os.dup(1), "wb"), sys.stdin.buffer
     os.dup2(2, 1)  # what a library prints goes where errors go
-    task, (path, given) = pickle.load(orders)
-    threading.Thread(target=_end_with, args=(orders,), daemon=True).start()
-    send = _Sender(channel)
-    sys.stdout, sys.stdin = _Printer(send), Path(os.devnull).open()  # noqa: SIM115 (as long as the process)
-    _limit_memory()
+    _end_with_parent()
     try:
-        send("done", _TASKS[task](load_plug(path), given, send))
+        task, (path, given) = pickle.load(orders)
+    except EOFError:  # it is not needed any more
+        os._exit(0)
+    threading.Thread(target=_end_with, args=(orders,), daemon=True).start()
+    send, before = _Sender(channel), set(sys.modules)
+    printer = _Printer(send)
+    sys.stdout = sys.stderr = printer
+    sys.stdin = Path(os.devnull).open()  # noqa: SIM115 (as long as the process)
+    sys.dont_write_bytecode = True  # which would be stale where a file is saved twice within a second
+    try:
+        _limit_memory()
+        answer = "done", _TASKS[task](load_plug(path), given, send)
     except PlugError as error:
-        send("fault", (error.path, error.line, error.column, error.message))
-    channel.flush()
+        answer = "fault", (error.path, error.line, error.column, error.message)
+    except (ValueError, OSError, MemoryError) as error:
+        answer = "refusal", str(error) or type(error).__name__
+    printer.end_line()
+    send("files", (path, *own_modules(path, before)))
+    send(*answer)
     os._exit(0)  # whatever threads the file has started
 
 
@@ -259,6 +295,24 @@ class _Printer(io.TextIOBase):
         self._line = self._line[:LONGEST_LINE]
         return len(text)
 
+    def end_line(self) -> None:
+        """Show a last line without an end too."""
+        if self._line:
+            self.write("\n")
+
+
+def own_modules(path: Path, before: set[str]) -> list[Path]:
+    """The files beside the plugged one that were imported since these modules were."""
+    files = [getattr(sys.modules[name], "__file__", None) for name in set(sys.modules) - before]
+    return [Path(file) for file in files if file and is_own(file, path.resolve().parent) and Path(file) != path]
+
+
+def _end_with_parent() -> None:
+    """Have Linux end this process with the one that has started it, also where one line of the file runs for ever."""
+    if sys.platform == "linux":
+        with suppress(OSError, AttributeError):
+            ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
+
 
 def _end_with(orders: IO[bytes]) -> None:
     """End this process when the one that has started it does."""
@@ -275,8 +329,10 @@ def _limit_memory() -> None:
     import psutil
 
     room = min(MEMORY, int(psutil.virtual_memory().available * 0.8))
-    limit = psutil.Process().memory_info().vms + room
-    resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+    limit, (_, most) = psutil.Process().memory_info().vms + room, resource.getrlimit(resource.RLIMIT_AS)
+    limit = limit if most == resource.RLIM_INFINITY else min(limit, most)
+    with suppress(ValueError, OSError):  # a system may not know this limit
+        resource.setrlimit(resource.RLIMIT_AS, (limit, most))
 
 
 if __name__ == "__main__":

@@ -39,6 +39,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return draw_sheet(scenes, options.size, options.gallery, options.stage)
         if why := why_no_window():
             print(f"no window: {why}", file=sys.stderr)
+            if options.plug:
+                print(f"{options.plug}: python -m raytracer render draws with it too", file=sys.stderr)
+                return 1
             return draw_sheet(scenes, options.size)
     except NoScenesError as error:
         print(error, file=sys.stderr)

@@ -71,6 +71,11 @@ class View:
         return self.scenes[self.place]
 
     @property
+    def seen_through(self) -> str:
+        """The lens, where there is anything to compare."""
+        return self.lens if self.has_own else OWN
+
+    @property
     def has_own(self) -> bool:
         """Whether the picture is another one than the reference, or may be."""
         return self.plug is not None or self.method != CERTIFIED
@@ -134,7 +139,7 @@ def to_file_view(view: View, key: str) -> View:
 
 
 def show_legend(view: View, key: str) -> View:
-    if STAGES[view.stage].legend:
+    if STAGES[view.stage].legend or view.seen_through in (DIFFERENCE, WIPE):
         return replace(view, legend=not view.legend)
     return replace(view, note=f"stage {view.stage} has no legend")
 
@@ -144,13 +149,13 @@ def read_again(view: View, key: str) -> View:
 
 
 def saved(view: View, path: Path) -> View:
-    """The view when a file has been saved, replaced or removed by somebody: a pixel's story is one of the past."""
-    view = _bare(view)
+    """The view when a file has been saved, replaced or removed by somebody: a pixel's story is one of the past.
+
+    What is not the scene's file is the plugged one, or one that it imports.
+    """
     if path == view.scene:
-        view = replace(view, readings=view.readings + 1)
-    if path == view.plug:
-        view = replace(view, plug_readings=view.plug_readings + 1)
-    return view
+        return replace(_bare(view), readings=view.readings + 1)
+    return replace(_bare(view), plug_readings=view.plug_readings + 1)
 
 
 def save(view: View, key: str) -> View:

@@ -109,9 +109,9 @@ def status(view: View, drawing: Drawing | None, size: int, frames_a_second: floa
     else:
         time = _time(drawing.milliseconds) if drawing.whole else f"drawing, {drawing.done:.0%}"
     how = view.stage if view.method == CERTIFIED else f"{view.stage} · {view.method}"
-    if view.samples_of_stage != 1:
+    if view.samples_of_stage != 1 and not (drawing and drawing.parts):  # a plugged file has its own way
         how += f" · {view.samples} samples"
-    if view.lens != OWN:
+    if view.seen_through != OWN:
         how += f" · {view.lens}"
     figures = f"{view.place + 1} of {len(view.scenes)} · {how} · {size} × {size} · {time}"
     path = "" if drawing is None else drawing.parts or (drawing.path and f"{drawing.path} path")
@@ -139,9 +139,9 @@ def _remark(view: View, drawing: Drawing | None) -> tuple[str, Colour]:
     """The second line: the answer to the last key, else warnings and wrong pixels, else what the method is."""
     if view.note:
         return view.note, BRIGHT
-    if view.lens != OWN:
+    if view.seen_through != OWN:
         reference = None if drawing is None else drawing.reference
-        return (LENSES[view.lens], DIM) if reference is None else _verdict(reference)
+        return (f"{LENSES[view.lens]}, when it is drawn", DIM) if reference is None else _verdict(reference)
     if drawing is not None and (drawing.wrong or drawing.warnings):
         wrong = [f"{drawing.wrong:,} of {drawing.picture[..., 0].size:,} pixels are wrong"] if drawing.wrong else []
         return "; ".join([*wrong, *drawing.warnings]), AMBER
@@ -161,7 +161,7 @@ def _verdict(reference: Reference) -> tuple[str, Colour]:
 def through_lens(view: View, drawing: Drawing) -> np.ndarray:
     """What the view wants to see of a drawing: uint8 (size, size, 3)."""
     reference = drawing.reference
-    if reference is None or view.lens == OWN:
+    if reference is None or view.seen_through == OWN:
         return drawing.picture
     if view.lens == WIPE:
         border = drawing.picture.shape[1] // 2 if view.border is None else view.border
@@ -290,8 +290,9 @@ def _strip(width: int, status: Status) -> np.ndarray:
     name = shortened(status.name, size, room - _length(figures, size) - MARGIN)
     draw.text((MARGIN, 4), name, BRIGHT, font(size))
     draw.text((width - MARGIN, 4), figures, BRIGHT, font(size), anchor="ra")
-    draw.text((width - MARGIN, 26), status.path, DIM, font(12), anchor="ra")
-    room -= round(_length(status.path, 12)) + MARGIN
+    path = shortened(status.path, 12, 0.4 * width)
+    draw.text((width - MARGIN, 26), path, DIM, font(12), anchor="ra")
+    room -= round(_length(path, 12)) + MARGIN
     small = next((s for s in (14, 13) if _length(status.remark, s) <= room), 12)
     draw.text((MARGIN, 25), shortened(status.remark, small, room), status.colour, font(small))
     return np.asarray(image)

@@ -16,7 +16,7 @@ from raytracer import STAGES, SceneError, interpreter, probe_pixel, render_scene
 from raytracer.camera import make_raster
 from raytracer.compare import DIFFERENCES_LEGEND
 from raytracer.methods import CERTIFIED
-from raytracer.plug_process import PATIENCE, PlugRunner
+from raytracer.plug_process import PATIENCE, PlugRunner, echo
 from sketch import controls
 from sketch.controls import DIFFERENCE, OWN, WIPE, View
 from sketch.files import save_beside
@@ -62,10 +62,10 @@ class Session:
         self._story: Story | None = None
         self._chores = ThreadPoolExecutor(1, "chores")  # what takes a moment and is not drawing
         self._failure: BaseException | None = None  # of a chore
-        plug = PlugRunner(view.plug, patience, self._say, ahead=True) if view.plug is not None else None
-        self._renderer = Renderer(lambda: self.changed(), plug)
-        self._renderer.post(self._request(view))
+        self._plug = PlugRunner(view.plug, patience, echo, ahead=True) if view.plug is not None else None
+        self._renderer = Renderer(lambda: self.changed(), self._plug)
         self._watcher = Watcher(self._watched, lambda path: self._change(lambda view: controls.saved(view, path)))
+        self._renderer.post(self._request(view))
 
     @property
     def failure(self) -> BaseException | None:
@@ -141,27 +141,24 @@ class Session:
             view = self._view
         request = self._request(view)
         if request != self._request(before):
+            self._watcher.look()  # what is saved from now on is another version than the one that will be read
             self._renderer.post(request)
         if view.pixel is not None and view.pixel != before.pixel:
             self._story = None
             self._chores.submit(self._do, lambda: self._tell(view.pixel))
         if view.wish == "save":
-            self._chores.submit(self._do, lambda: self._save(request))
+            self._chores.submit(self._do, lambda: self._save(view, request))
         self.changed()
 
     def _request(self, view: View) -> Request:
         return Request(
             view.scene, view.stage, self.layout.size, view.method, view.readings, view.orbit, view.samples_of_stage,
-            0 if view.plug is None else view.plug_readings + 1, view.lens != OWN and view.has_own,
+            0 if view.plug is None else view.plug_readings + 1, view.seen_through != OWN,
         )  # fmt: skip
 
     def _watched(self) -> list[Path]:
-        return [path for path in (self._view.scene, self._view.plug) if path is not None]
-
-    @staticmethod
-    def _say(line: str) -> None:
-        """A plugged file prints."""
-        print(line, flush=True)  # noqa: T201 (on its behalf)
+        view, plug = self._view, self._plug
+        return [view.scene] if plug is None else [view.scene, plug.path, *(set(plug.files) - {plug.path})]
 
     def _panel(self, view: View, drawing: Drawing | None) -> Panel | None:
         """What lies over the picture."""
@@ -172,7 +169,7 @@ class Session:
         if drawing is not None and drawing.error:
             return error_panel(drawing)
         reference = None if drawing is None else drawing.reference
-        if reference is not None and reference.causes and view.legend and view.lens in (DIFFERENCE, WIPE):
+        if reference is not None and reference.causes and view.legend and view.seen_through in (DIFFERENCE, WIPE):
             return causes_panel(reference.causes)
         return None
 
@@ -186,7 +183,7 @@ class Session:
         """What the colours of the picture mean, if its stage says so."""
         if drawing is None or not view.legend:
             return ()
-        if view.lens == DIFFERENCE and drawing.reference is not None:
+        if view.seen_through == DIFFERENCE and drawing.reference is not None:
             return DIFFERENCES_LEGEND
         return STAGES[drawing.request.stage].legend
 
@@ -227,7 +224,7 @@ class Session:
         red, green, blue = drawing.picture[pixel[1], pixel[0]].tolist()
         return [f"{drawing.parts.partition(':')[0]} drew ({red}, {green}, {blue})"] if drawing.parts else []
 
-    def _save(self, request: Request) -> str:
+    def _save(self, view: View, request: Request) -> str:
         """Save what was seen, or on its way, when the key was pressed."""
         latest = self._renderer.drawing
         seen = self._seen()
@@ -236,13 +233,15 @@ class Session:
                 return "not saved: there is no picture"
             request = seen.request
         if seen is not None and seen.full and seen.request == request:
-            picture = through_lens(self._view, seen)
-        elif request.plug:
+            if request.compared and seen.reference is None:
+                return "not saved: the comparison is not finished"
+            picture = through_lens(view, seen)
+        elif request.plug or request.compared:
             return "not saved: the picture is not finished"
         else:  # not finished, given up for the next one, or coarse
             size, scene = request.size, seen_from(interpreter(request.path), request.orbit)
             picture = render_scene(scene, request.stage, size, size, method=request.method)
-        return f"saved {save_beside(_file_name(request, self._view), picture)}"
+        return f"saved {save_beside(_file_name(request, view), picture)}"
 
     def _seen(self) -> Drawing | None:
         """Whose picture is seen: under the message about a broken scene, still that of the one before."""

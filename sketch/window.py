@@ -9,6 +9,7 @@ itself.
 from __future__ import annotations
 
 import os
+import signal
 import sys
 import traceback
 from collections.abc import Callable
@@ -29,6 +30,7 @@ import py5  # noqa: E402 (starts Java)
 def run_window(session: Session) -> NoReturn:
     """Open the window and stay until it closes; then end the process."""
     window = Window(session)
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # from now on there is something to close
     try:
         window.run_sketch(block=True)  # macOS knows no other way
     except KeyboardInterrupt:

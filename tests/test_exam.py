@@ -82,6 +82,15 @@ def test_a_method_is_judged_on_scenes_and_families(folder):
     assert all(result.right for result in results if result.check != STABILITY)
 
 
+def test_a_scene_that_cannot_be_read_is_told(tmp_path, capsys):
+    (tmp_path / "1.cli").write_text("spere")
+    (tmp_path / "mine.py").write_text(template("stage"))
+    assert main(["test", str(tmp_path / "mine.py"), "--scenes", str(tmp_path)]) == 1
+    error = capsys.readouterr().err
+    assert "1.cli:1:1: found 'spere'" in error
+    assert error.count("\n") == 1
+
+
 def test_the_command_says_what_is_right_and_ends_with_1_where_a_scene_of_the_course_is_wrong(tmp_path, capsys):
     scenes, mine = tmp_path / "scenes", tmp_path / "mine.py"
     (scenes / "hard").mkdir(parents=True)

@@ -17,7 +17,7 @@ from raytracer import STAGES, Cancelled, eye_hits, interpreter, render_scene
 from raytracer.__main__ import TEMPLATES, main
 from raytracer.interpreter import interpret
 from raytracer.plug import PARTS, Order, Plug, PlugError, draw_plugged, load_plug
-from raytracer.plug_process import MOST_LINES, PlugRunner
+from raytracer.plug_process import MOST_LINES, PlugRunner, echo
 
 SCENES = Path(__file__).parent.parent / "scenes"
 SPHERES, TRIANGLES = (interpreter(SCENES / f"{name}.cli") for name in ("02_three_spheres", "07_colorful_lights"))
@@ -142,12 +142,17 @@ FAULTS = {
     "import nothing_of_the_kind": (1, 1, "ModuleNotFoundError"),
     "raise ValueError('a\\nb')": (1, 1, "ValueError: a b"),
     "def shade(hit): return shade(hit)": (1, 24, "RecursionError"),
+    "# -*- coding: utf8x -*-": (None, None, "SyntaxError: unknown encoding: utf8x"),
+    "def shade(hit): hit.t = 3": (1, 17, "FrozenInstanceError"),
+    "def shade(hit): return ('ééé', 1 / 0)": (1, 32, "ZeroDivisionError"),
+    "import functools\nshade = functools.partial(print)": (None, None, "the function returned None, expected a colour"),
     "\0": (None, None, "source code string cannot contain null bytes"),
 }
 
 
 @pytest.mark.parametrize("source", FAULTS)
-def test_a_fault_is_told_with_its_place(source, tmp_path):
+def test_a_fault_is_told_with_its_place(source, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # as people do
     line, column, message = FAULTS[source]
     with pytest.raises(PlugError) as caught:
         draw_plugged(plugged(tmp_path, source), Order(SPHERES, "diffuse", SIZE, SIZE))
@@ -210,7 +215,7 @@ def test_what_crashes_is_told(tmp_path):
 @pytest.mark.skipif(sys.platform != "linux", reason="the limit is the system's")
 def test_what_eats_memory_is_told(tmp_path):
     with pytest.raises(PlugError, match=r":3:\d+: MemoryError"):
-        run(tmp_path, "kept = []\ndef shade(hit):\n    while True: kept.append(bytearray(1 << 30))")
+        run(tmp_path, "import numpy; kept = []\ndef shade(hit):\n    while True: kept.append(numpy.empty(1 << 27))")
 
 
 def test_prints_are_passed_on_but_not_a_million(tmp_path):
@@ -218,6 +223,62 @@ def test_prints_are_passed_on_but_not_a_million(tmp_path):
     assert said[:3] == ["0", "1", "2"]
     assert len(said) == MOST_LINES + 1
     assert "the rest is left out" in said[-1]
+
+
+def test_a_last_line_without_an_end_is_shown_and_so_are_errors_of_ones_own(tmp_path):
+    source = "import sys\nprint('a', file=sys.stderr)\nprint('b', end='')\ndef shade(hit): return 0, 0, 0"
+    assert run(tmp_path, source)[2] == ["a", "b"]
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork")
+def test_a_file_that_starts_processes_is_ended_with_them(tmp_path):
+    started = tmp_path / "started"
+    source = (
+        "import os, time\n"
+        f"if os.fork() == 0: open({str(started)!r}, 'w').write(str(os.getpid())); time.sleep(1000)\n"
+        "time.sleep(1000)\n"
+    )
+    with pytest.raises(Cancelled):
+        run(tmp_path, source, cancelled=lambda: started.exists() and bool(started.read_text()))
+    end = time.monotonic() + 20
+    while _is_alive(int(started.read_text())):
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+def test_a_limit_of_the_systems_that_is_lower_is_kept(tmp_path):
+    (tmp_path / "mine.py").write_text(template("tracer"))
+    command = ("-m", "raytracer", "render", SCENES / "01_one_sphere.cli", "-o", tmp_path / "x.png", "--size", "16")
+    resource = pytest.importorskip("resource")
+    done = subprocess.run(
+        [sys.executable, *map(str, command), "--plug", tmp_path / "mine.py"],
+        cwd=Path(__file__).parent.parent, capture_output=True, text=True, check=False,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (6 << 30, 6 << 30)),
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_a_module_beside_the_file_is_one_of_its_files(tmp_path):
+    (tmp_path / "beside_mine.py").write_text("GREEN = 0, 1, 0\n")
+    (tmp_path / "mine.py").write_text("import json\nfrom beside_mine import GREEN\ndef shade(hit): return GREEN")
+    runner = PlugRunner(tmp_path / "mine.py")
+    runner.draw(Order(SPHERES, "diffuse", SIZE, SIZE))
+    assert set(runner.files) == {tmp_path / "mine.py", tmp_path / "beside_mine.py"}
+    assert not (tmp_path / "__pycache__").exists()
+
+
+def test_anything_that_is_printed_can_be_written(capsys, monkeypatch):
+    echo("ümlaut \ud800")
+    assert capsys.readouterr().out == "ümlaut \\ud800\n"
+    monkeypatch.setattr(sys, "stdout", None)
+    echo("nobody reads")
+
+
+@pytest.mark.parametrize("kind", TEMPLATES)
+def test_a_template_survives_the_shells_of_windows(kind, tmp_path):
+    assert template(kind).isascii()
+    (tmp_path / "mine.py").write_bytes(template(kind).encode("utf-16"))
+    assert load_plug(tmp_path / "mine.py").functions
 
 
 def test_asking_for_input_is_a_fault(tmp_path):

@@ -12,9 +12,9 @@ def stage(block):
     """Colours of a block of pixels, 0 to 1: an array of the shape of block.hits.index, and three colours.
 
     block.hit is True where anything is hit: an array, one a pixel. These have a row for each of those pixels:
-    block.points, block.normals (of length 1), block.diffuse (its colour), block.cosine(light), which is max(0, N·L),
+    block.points, block.normals (of length 1), block.diffuse (its colour), block.cosine(light), which is max(0, N*L),
     block.to_light(light), unit vectors. block.hits.t and block.hits.index say how far and which shape, for all pixels.
-    block.lights are the lights, block.scene is the scene. block.paint(colours, elsewhere=…) puts the colours of the
+    block.lights are the lights, block.scene is the scene. block.paint(colours, elsewhere=...) puts the colours of the
     hits back where they belong.
     """
     total = np.zeros_like(block.diffuse)

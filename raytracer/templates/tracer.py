@@ -25,7 +25,7 @@ def eye_ray(camera, x, y, width, height):
 
 
 def intersect(ray, sphere):
-    """t of the first hit with t > 0, at ray.origin + t · ray.direction, or None.
+    """t of the first hit with t > 0, at ray.origin + t * ray.direction, or None.
 
     The sphere has a centre and a radius. At the first stage True and False will do.
     """

@@ -55,9 +55,11 @@ def run_display() -> Iterator[str]:
     with os.fdopen(reading) as answer:
         number = answer.readline().strip()
     assert number, "Xvfb did not start"
-    yield f":{number}"
-    server.terminate()
-    server.wait(PATIENCE)
+    try:
+        yield f":{number}"
+    finally:
+        server.terminate()
+        server.wait(PATIENCE)
 
 
 @pytest.fixture

@@ -73,7 +73,14 @@ def keys(changes: int, seed: int) -> Iterator[tuple[str, int, str]]:
 
 def soak(display: str, folder: Path, changes: int, seed: int = 1) -> Outcome:
     """Press keys in bursts; the last one of each is waited for."""
-    sketch = Sketch(display, folder, "--size", SIZE).find_window()
+    sketch = Sketch(display, folder, "--size", SIZE)
+    try:
+        return _soaked(sketch.find_window(), changes, seed)
+    finally:
+        sketch.process.kill()
+
+
+def _soaked(sketch: Sketch, changes: int, seed: int) -> Outcome:
     process, waits, memory = psutil.Process(sketch.process.pid), [], []
     script = list(keys(changes, seed))
     for start in range(0, changes, BURST):

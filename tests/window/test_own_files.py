@@ -137,6 +137,28 @@ def test_the_window_closes_while_a_plugged_file_draws(start, scene, tmp_path):
         time.sleep(0.05)
 
 
+def test_mending_the_module_that_a_file_imports_clears_the_banner(start, scene, tmp_path):
+    mine, beside = tmp_path / "mine.py", tmp_path / "colours_of_mine.py"
+    mine.write_text("from colours_of_mine import green\ndef shade(hit): return green()\n")
+    beside.write_text("def green(): return 0, 1, 0\n")
+    sketch = start(scene, "--size", SIZE, "--plug", mine)
+    sketch.wait_for_picture(in_green(scene), "one's own picture")
+    beside.write_text("def green(): return 0, 1, none\n")
+    sketch.wait_until(lies_under_a_banner(sketch, in_green(scene)), "the banner")
+    beside.write_text("def green(): return 0, 1, 0\n")
+    sketch.wait_for_picture(in_green(scene), "one's own picture again")
+
+
+def test_ctrl_c_at_any_moment_of_the_start_is_quiet(display, tmp_path):
+    for delay in (0.1, 0.4, 0.8, 1.2, 1.8):
+        sketch = Sketch(display, tmp_path, "--size", 64)
+        time.sleep(delay)
+        sketch.interrupt()
+        assert sketch.end() in (130, -2)  # −2 while Python itself starts
+        assert "raytracer" not in sketch.stderr.read_text()
+        assert not list(tmp_path.glob("*.png"))
+
+
 def test_the_usual_mistake_is_named_and_gone_when_it_is_mended(start, scene, tmp_path):
     """What a newcomer does: the printed template, a slip, key v, the cause, the slip mended, nothing differs."""
     right = resources.files("raytracer").joinpath("templates", "stage.py").read_text("utf-8")
