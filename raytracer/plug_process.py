@@ -27,13 +27,16 @@ from typing import IO, Any
 
 import numpy as np
 
+from raytracer.interpreter import interpret
+from raytracer.plan import make_plan
 from raytracer.plug import Order, Plug, PlugError, draw_plugged, is_own, load_plug
-from raytracer.render import Cancelled
+from raytracer.render import Cancelled, draw
 
 PATIENCE = 60.0  # seconds without a sign of life after which a picture is given up
 MEMORY = 4 << 30  # bytes that a plugged file may take, unless less are free
 MOST_LINES, LONGEST_LINE = 1000, 2000  # that are printed of each picture, and characters of each
 _LOOK = 0.02  # seconds between two questions whether the picture is still wanted
+_LONG = 0.5  # seconds after which the next process is started though this one is at work, on the same cores
 _OFTEN = 0.05  # seconds from one message about the picture to the next
 
 Tell = Callable[..., object]  # see `draw_plugged` and `exam.examine`
@@ -107,12 +110,16 @@ class PlugRunner:
         self._busy = child
         try:
             child.begin(task, (self.path, given))
-            if self.ahead and not self._closed:
-                self._spare = _Child()
             return self._follow(child, tell, cancelled)
         finally:
             child.kill()
             self._busy = None
+            self._get_ready()
+
+    def _get_ready(self) -> None:
+        """Start the process for the next picture."""
+        if self.ahead and self._spare is None and not self._closed:
+            self._spare = _Child()
 
     def close(self) -> None:
         """End all processes."""
@@ -141,12 +148,14 @@ class PlugRunner:
 
     def _messages(self, child: _Child, cancelled: Callable[[], bool]) -> Iterator[tuple[str, Any]]:
         """What the child says, until that is not wanted any more. Prints are no sign of life: a loop may print."""
-        heard = time.monotonic()
+        begun = heard = time.monotonic()
         while not cancelled():
             with suppress(queue.Empty):
                 message = child.messages.get(timeout=_LOOK)
                 heard = heard if message[0] == "print" else time.monotonic()
                 yield message
+            if time.monotonic() - begun > _LONG:
+                self._get_ready()
             if time.monotonic() - heard > self.patience:
                 text = f"no sign of life for {self.patience:g} seconds: given up (does it loop for ever?)"
                 raise PlugError(self.path, None, None, text)
@@ -217,6 +226,7 @@ def serve() -> None:
     channel, orders = os.fdopen(os.dup(1), "wb"), sys.stdin.buffer
     os.dup2(2, 1)  # what a library prints goes where errors go
     _end_with_parent()
+    _warm_up()
     try:
         task, (path, given) = pickle.load(orders)
     except EOFError:  # it is not needed any more
@@ -301,6 +311,14 @@ class _Printer(io.TextIOBase):
             self.write("\n")
 
 
+def _warm_up() -> None:
+    """Do what takes time once, and is not known from what is asked for."""
+    import psutil  # noqa: F401 (loaded ahead)
+
+    ball = interpret("surface 1 1 1 0 0 0 0 0 0 1 0\nlight 0 0 0 1 1 1\nsphere 1 0 0 -3")
+    draw(make_plan(ball, width=64, height=64))
+
+
 def own_modules(path: Path, before: set[str]) -> list[Path]:
     """The files beside the plugged one that were imported since these modules were."""
     files = [getattr(sys.modules[name], "__file__", None) for name in set(sys.modules) - before]
@@ -326,7 +344,7 @@ def _limit_memory() -> None:
         import resource  # which Windows has not
     except ImportError:
         return
-    import psutil
+    import psutil  # slow to load
 
     room = min(MEMORY, int(psutil.virtual_memory().available * 0.8))
     limit, (_, most) = psutil.Process().memory_info().vms + room, resource.getrlimit(resource.RLIMIT_AS)
