@@ -65,7 +65,7 @@ def _by_plug(arguments: argparse.Namespace, scene: Scene) -> np.ndarray | None:
     width, height = arguments.size
     order = Order(scene, arguments.stage, width, height, arguments.sampling, arguments.method)
     with closing(PlugRunner(arguments.plug, arguments.patience, echo)) as runner:
-        picture, names = runner.draw(order, cancelled=interrupts.came)
+        picture, names, _ = runner.draw(order, cancelled=interrupts.came)
     if not names:
         print(f"{arguments.plug}: has no part in stage {arguments.stage}", file=sys.stderr)
     return picture
@@ -282,10 +282,12 @@ SCENES = Path(__file__).resolve().parent.parent / "scenes"
 TEMPLATES = ("tracer", "picture", "stage", "method")
 _SCENE = Argument(("scene",), {"metavar": "SCENE", "type": Path, "help": "a .cli file"})
 _METHOD = Argument(
-    ("--method",), {"choices": METHODS, "default": CERTIFIED, "help": "how rays meet spheres, default certified"}
+    ("--method",),
+    {"metavar": "METHOD", "choices": METHODS, "default": CERTIFIED, "help": "how rays meet spheres, default certified"},
 )
 _STAGE = Argument(
-    ("--stage",), {"choices": STAGES, "default": "diffuse", "help": "what is drawn; the default is diffuse"}
+    ("--stage",),
+    {"metavar": "STAGE", "choices": STAGES, "default": "diffuse", "help": "what is drawn; the default is diffuse"},
 )
 _SAMPLING = Argument(
     ("--sampling",),

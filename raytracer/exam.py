@@ -6,6 +6,7 @@ Each check asks for one thing alone: colours are judged on hits that are right, 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import isqrt
 from pathlib import Path
@@ -14,7 +15,7 @@ import numpy as np
 
 from raytracer.arrays import Hits
 from raytracer.compare import differences
-from raytracer.course import hits_of_rays, hits_one_by_one, three_numbers
+from raytracer.course import Ray, hits_of_rays, hits_one_by_one, three_numbers
 from raytracer.families import FAMILIES, Bundle, bundles
 from raytracer.interpreter import SceneError, interpreter
 from raytracer.mistakes import advice, recognise
@@ -22,7 +23,7 @@ from raytracer.plan import make_plan
 from raytracer.plug import Order, Plug, PlugError, blaming, draw_plugged, method_of
 from raytracer.probe import probe_pixel
 from raytracer.render import eye_hits, render_scene
-from raytracer.scene import Camera, Materials, Scene, Spheres
+from raytracer.scene import Camera, Material, Materials, Scene, Sphere, Spheres
 from raytracer.trace import ray_intersect_scene
 from raytracer.verify import true_hits
 
@@ -124,8 +125,18 @@ def _hits(plug: Plug, path: Path, scene: Scene, size: int) -> Iterator[Result]:
     with np.errstate(invalid="ignore"):
         far = same & ~(np.abs(found.t - true.t) <= _CLOSE * np.abs(true.t))
     wrong = {"hit": (found.index >= 0) != (true.index >= 0), "nearest": both & ~same, "t": far}
-    for check, mask in wrong.items():
+    for check, mask in wrong.items() if not _says_only_whether(plug) else [("hit", wrong["hit"])]:
         yield _result(check, path, scene, mask, lambda x, y: _told(found, (y, x)))
+
+
+def _says_only_whether(plug: Plug) -> bool:
+    """Whether the file's `intersect` answers True or False, as at the first stage: then that is all that is asked."""
+    ask = plug.functions.get("intersect")
+    with suppress(Exception):
+        return ask is not None and isinstance(
+            ask(Ray((0, 0, 0), (0, 0, -1)), Sphere(1.0, (0, 0, -4), Material())), bool
+        )
+    return False
 
 
 def eye_hits_by(plug: Plug, scene: Scene, size: int) -> Hits:
@@ -183,6 +194,8 @@ def _stability(plug: Plug, family: str) -> Iterator[Result]:
         with blaming(plug.path, f"asked for rays of the family {family}"):
             found = _found(plug, bundle)
         asked += len(true.index)
+        if _says_only_whether(plug):
+            true, found = (Hits(hits.t, np.where(hits.index >= 0, 0, -1)) for hits in (true, found))
         for k in np.flatnonzero(found.index != true.index).tolist():
             wrong += 1
             story = story or (
@@ -228,16 +241,35 @@ _CHECKS: dict[str, tuple[set[str], Callable[..., Iterator[Result]]]] = {  # and 
 
 
 def summary(results: list[Result]) -> Iterator[str]:
-    """The results for a person: a line a check, what is wrong in it, and the story of its first failure."""
+    """The results for a person: the verdict on the course's scenes, then check by check, then what is beyond them."""
+    hard = [result for result in results if _is_hard(result)]
+    course = [result for result in results if not _is_hard(result)]
+    scenes = {result.subject for result in course}
+    wrong = sorted({result.subject for result in course if not result.right})
+    verdict = (
+        f"{len(wrong)} of {len(scenes)} are wrong: {', '.join(wrong)}" if wrong else f"all {len(scenes)} are right"
+    )
+    yield f"scenes of the course: {verdict}"
+    yield from _lines(course, "scenes")
+    if hard:
+        yield "beyond the course, where usual formulas fail:"
+        yield from _lines(hard, "hard scenes")
+
+
+def _is_hard(result: Result) -> bool:
+    return result.check == STABILITY or result.subject.startswith(f"{HARD}/")
+
+
+def _lines(results: list[Result], scenes: str) -> Iterator[str]:
     for check, about in ABOUT.items():
         some = [result for result in results if result.check == check]
         if not some:
             continue
-        right, kinds = sum(result.right for result in some), "families" if check == STABILITY else "scenes"
-        yield f"{check:10}{right} of {len(some)} {kinds} right: {about}"
+        right, kinds = sum(result.right for result in some), "families" if check == STABILITY else scenes
+        yield f"  {check:10}{right} of {len(some)} {kinds} right: {about}"
         faulty = [result for result in some if result.wrong or result.fault]
-        yield from (f"    {result}" for result in faulty)
+        yield from (f"      {result}" for result in faulty)
         first = next((result for result in faulty if not result.right and result.story), None)
         if first is not None:
-            yield f"    the first, in {first.subject}:"
-            yield from (f"        {line}" for line in first.story)
+            yield f"      the first, in {first.subject}:"
+            yield from (f"          {line}" for line in first.story)

@@ -6,6 +6,7 @@ own code: see `raytracer.plug_process`, which does that where it can be given up
 
 from __future__ import annotations
 
+import ast
 import codecs
 import sys
 import sysconfig
@@ -141,6 +142,22 @@ def _check_takes(path: Path, name: str, function: Callable[..., Any]) -> None:
         raise PlugError(path, line, None, message) from None
     except ValueError:  # something built in, of which nothing is known
         pass
+
+
+def stage_said_by(path: Path) -> str | None:
+    """The stage that a file says it draws, as far as can be seen without running it."""
+    try:
+        tree = ast.parse(path.read_bytes())
+    except (OSError, ValueError, SyntaxError, RecursionError, MemoryError):
+        return None
+    said = [
+        node.value.value
+        for node in tree.body
+        if isinstance(node, ast.Assign) and isinstance(node.value, ast.Constant)
+        for target in node.targets
+        if isinstance(target, ast.Name) and target.id == "STAGE"
+    ]
+    return next((stage for stage in said[-1:] if isinstance(stage, str) and stage in STAGES), None)
 
 
 def draw_plugged(plug: Plug, order: Order, tell: Tell = lambda picture, done: None) -> np.ndarray:

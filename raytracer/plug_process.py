@@ -91,12 +91,12 @@ class PlugRunner:
 
     def draw(
         self, order: Order, tell: Tell = lambda picture, done: None, cancelled: Callable[[], bool] = lambda: False
-    ) -> tuple[np.ndarray | None, Names]:
-        """The picture, uint8 (height, width, 3), and which functions of the file had a part in it.
+    ) -> tuple[np.ndarray | None, Names, Names]:
+        """The picture, uint8 (height, width, 3), which functions of the file had a part in it, and which had not.
 
         None if none of them had. Raises `PlugError`, and `Cancelled` when that is said.
         """
-        found: tuple[np.ndarray | None, Names] = self.run("draw", order, tell, cancelled)
+        found: tuple[np.ndarray | None, Names, Names] = self.run("draw", order, tell, cancelled)
         return found
 
     def examine(self, scenes: list[Path], size: int, tell: Tell) -> Names:
@@ -250,9 +250,10 @@ def serve() -> None:
     os._exit(0)  # whatever threads the file has started
 
 
-def _draw(plug: Plug, order: Order, send: _Sender) -> tuple[np.ndarray | None, Names]:
+def _draw(plug: Plug, order: Order, send: _Sender) -> tuple[np.ndarray | None, Names, Names]:
     names = plug.parts_of(order.stage)
-    return draw_plugged(plug, order, send.picture) if names else None, names
+    others = tuple(name for name in plug.functions if name not in names)
+    return draw_plugged(plug, order, send.picture) if names else None, names, others
 
 
 def _examine(plug: Plug, given: tuple[list[Path], int], send: _Sender) -> Names:

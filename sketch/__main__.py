@@ -11,6 +11,7 @@ from pathlib import Path
 
 from raytracer import METHODS, STAGES, save_png
 from raytracer.methods import CERTIFIED
+from raytracer.plug import stage_said_by
 from raytracer.plug_process import PATIENCE, plugged_file, seconds
 from sketch import display, java
 from sketch.controls import View, keys_as_markdown
@@ -20,7 +21,7 @@ from sketch.session import Session
 from sketch.sheet import TILE, contact_sheet, gallery
 
 SCENES = Path(__file__).resolve().parent.parent / "scenes"
-SIZE, LARGEST = 640, 4096
+SIZE, LARGEST, STAGE = 640, 4096, "diffuse"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -36,7 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.sheet:
             return draw_sheet(scenes, options.size, options.sheet)
         if options.gallery:
-            return draw_sheet(scenes, options.size, options.gallery, options.stage)
+            return draw_sheet(scenes, options.size, options.gallery, options.stage or STAGE)
         if why := why_no_window():
             print(f"no window: {why}", file=sys.stderr)
             if options.plug:
@@ -46,7 +47,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except NoScenesError as error:
         print(error, file=sys.stderr)
         return 1
-    view = View(scenes, place, options.stage, options.method, plug=options.plug)
+    said = stage_said_by(options.plug) if options.plug else None
+    view = View(scenes, place, options.stage or said or STAGE, options.method, plug=options.plug)
     return open_window(view, options.size or SIZE, options.patience)
 
 
@@ -116,8 +118,13 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
         help="a folder of scenes (.cli), or one of its files to begin with (default: the project's scenes)",
     )  # fmt: skip
     parser.add_argument("--size", metavar="N", type=_size, help=f"draw N × N pixels (default: {SIZE})")
-    parser.add_argument("--stage", choices=STAGES, default="diffuse", help="the stage to begin with, or of the gallery")
-    parser.add_argument("--method", choices=METHODS, default=CERTIFIED, help="the method to begin with")
+    parser.add_argument(
+        "--stage", metavar="STAGE", choices=STAGES,
+        help=f"the stage to begin with, or of the gallery (default: {STAGE}, or what a plugged file says)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--method", metavar="METHOD", choices=METHODS, default=CERTIFIED, help="the method to begin with"
+    )
     parser.add_argument(
         "--plug", metavar="FILE.py", type=plugged_file,
         help="a file of your own whose functions stand in for the tracer's; python -m raytracer template shows some",

@@ -155,7 +155,10 @@ def _verdict(reference: Reference) -> tuple[str, Colour]:
     found = reference.comparison
     if not found.wrong:
         return ("no pixel differs" if not found.largest else "no pixel differs by more than 1"), DIM
-    return f"{found.wrong:,} of {found.pixels:,} pixels are wrong, by up to {found.largest}", AMBER
+    if reference.on_edge == found.wrong:
+        return f"{found.wrong:,} of {found.pixels:,} pixels differ, all where only rounding decides", DIM
+    edge = f", {reference.on_edge:,} where rounding decides" if reference.on_edge else ""
+    return f"{found.wrong:,} of {found.pixels:,} pixels are wrong, by up to {found.largest}{edge}", AMBER
 
 
 def through_lens(view: View, drawing: Drawing) -> np.ndarray:

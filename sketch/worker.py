@@ -15,8 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
-from raytracer import Cancelled, Scene, backend, interpreter, make_plan
-from raytracer.compare import Comparison, compare, difference_picture
+from raytracer import Cancelled, Plan, Scene, backend, interpreter, make_plan
+from raytracer.compare import TOLERANCE, Comparison, compare, difference_picture, differences
 from raytracer.faults import FileError
 from raytracer.methods import CERTIFIED
 from raytracer.mistakes import recognise
@@ -32,6 +32,7 @@ from sketch.pace import COARSENESS, Pace, enlarged
 
 BLANK = 40  # the grey of pixels that nothing was drawn on yet
 REST = 0.12  # seconds without a movement until the camera is at rest
+_MANY = 1000  # shapes that numpy does not look through once more
 _PATIENCE = 1 / 30  # seconds: between two looks at a picture that grows; for a frame, when the next one is wanted
 
 
@@ -61,6 +62,7 @@ class Reference:
     picture: np.ndarray  # uint8 (size, size, 3)
     difference: np.ndarray  # the same shape, in the colours of DIFFERENCES_LEGEND
     comparison: Comparison
+    on_edge: int = 0  # of the wrong pixels, those that float64 cannot decide
     causes: tuple[str, ...] = ()  # typical mistakes that make this difference, if any are known to
 
 
@@ -230,7 +232,9 @@ class Renderer:
             samples = 1 if drawing.parts else drawing.request.samples
             expected = draw_samples(plan, samples, cancelled=self._superseded)
             found = drawing.picture
-            reference = Reference(expected, difference_picture(found, expected), compare(found, expected))
+            difference, comparison = difference_picture(found, expected), compare(found, expected)
+            on_edge = _undecided(plan, found, expected) if comparison.wrong else 0
+            reference = Reference(expected, difference, comparison, on_edge)
             self.drawing = self.whole = drawing = replace(drawing, reference=reference)
             self._changed()
             self._find_causes(drawing, reference)
@@ -273,20 +277,21 @@ class Renderer:
     def _draw_by_plug(self, drawing: Drawing) -> str:
         """Have the plugged file draw; which of its parts did, or nothing if it has none in this picture."""
         assert self._plug is not None
-        assert drawing.scene is not None
-        request, picture = drawing.request, drawing.picture
+        request, picture, name, scene = drawing.request, drawing.picture, self._plug.path.name, drawing.scene
+        assert scene is not None
+        self.drawing = drawing = replace(drawing, parts=name)
 
         def tell(so_far: np.ndarray, done: float) -> None:
             picture[...] = so_far
             self.drawing = replace(drawing, done=min(done, 0.999))
             self._changed()
 
-        order = Order(drawing.scene, request.stage, request.size, request.size, method=request.method)
-        found, names = self._plug.draw(order, tell, self._superseded)
+        order = Order(scene, request.stage, request.size, request.size, method=request.method)
+        found, names, others = self._plug.draw(order, tell, self._superseded)
         if found is None:
             return ""
         picture[...] = found
-        return f"{self._plug.path.name}: {', '.join(names)}"
+        return f"{name}: {', '.join(names)}{''.join(f', not {other}' for other in others)}"
 
     def _superseded(self) -> bool:
         """Whether another picture is wanted; one that is to be compared too is the same."""
@@ -308,6 +313,14 @@ class Renderer:
         if self.whole is not None and self.whole.request.size == size:
             return self.whole.picture.copy()
         return np.full((size, size, 3), BLANK, np.uint8)
+
+
+def _undecided(plan: Plan, found: np.ndarray, expected: np.ndarray) -> int:
+    """How many pixels are wrong where float64 cannot decide what their rays hit."""
+    if len(plan.scene) > _MANY:
+        return 0
+    doubtful = plan.eye.doubtful(slice(0, plan.raster.height))
+    return int((doubtful & (differences(found, expected) > TOLERANCE)).sum())
 
 
 def bring_in_kernels(seen: Drawing) -> bool:

@@ -68,6 +68,13 @@ def test_hits_from_inside_are_asked_for(folder):
     }
 
 
+def test_who_says_only_whether_is_asked_only_that(folder):
+    says = template("tracer").replace("return t\n", "return True\n").replace("return None", "return False")
+    results = [result for result in results_of(folder, says, COURSE[:4]) if result.check != STABILITY]
+    assert {result.check for result in results} == {"rays", "hit", "colour"}
+    assert all(result.right for result in results)
+
+
 def test_a_stage_is_judged_as_the_stage_that_it_says(folder):
     source = template("stage").replace('STAGE = "diffuse"', 'STAGE = "full"')
     results = results_of(folder, source, COURSE[:5])
@@ -101,10 +108,13 @@ def test_the_command_says_what_is_right_and_ends_with_1_where_a_scene_of_the_cou
     assert main(command) == 0
     said = capsys.readouterr().out
     assert f"{mine}: eye_ray, intersect, shade" in said
-    assert "hit       1 of 2 scenes right" in said
-    assert "    hard/1: " in said
+    assert "scenes of the course: all 1 are right" in said
+    assert "  hit       1 of 1 scenes right" in said
+    assert "  hit       0 of 1 hard scenes right" in said
+    assert "      hard/1: " in said
     mine.write_text(template("tracer").replace("if t > 0", "if t < 0"))
     assert main(command) == 1
     said = capsys.readouterr().out
-    assert "    2: " in said
+    assert "scenes of the course: 1 of 1 are wrong: 2" in said
+    assert "      2: " in said
     assert "yours: hits nothing" in said

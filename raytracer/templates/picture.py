@@ -21,8 +21,9 @@ def pixel(scene, x, y, width, height):
     camera = scene.camera
     across, up, d = (2 * x - width) / height, (height - 2 * y) / height, 1 / tan(radians(camera.fov) / 2)
     direction = [across * u + up * v - d * w for u, v, w in zip(camera.u, camera.v, camera.w)]
-    hits = [t for sphere in scene.spheres if (t := intersect(camera.eye, direction, sphere)) is not None]
-    return (0.8, 0.2, 0.3) if hits else scene.background
+    ts = [intersect(camera.eye, direction, sphere) for sphere in scene.spheres]
+    ts += [intersect_triangle(camera.eye, direction, triangle) for triangle in scene.triangles]
+    return scene.background if all(t is None for t in ts) else (0.8, 0.2, 0.3)
 
 
 def intersect(origin, direction, sphere):
@@ -33,6 +34,27 @@ def intersect(origin, direction, sphere):
         return None
     roots = (-b - sqrt(disc)) / (2 * a), (-b + sqrt(disc)) / (2 * a)
     return next((t for t in roots if t > 0), None)
+
+
+def intersect_triangle(origin, direction, triangle):
+    """Moeller and Trumbore: t and the weights of the second and third vertex solve three linear equations."""
+    first, second, third = triangle.vertices
+    edge, other = minus(second, first), minus(third, first)
+    away, p = minus(origin, first), cross(direction, other)
+    determinant = dot(edge, p)
+    if determinant == 0:
+        return None
+    q = cross(away, edge)
+    v, w, t = dot(away, p) / determinant, dot(direction, q) / determinant, dot(other, q) / determinant
+    return t if v >= 0 and w >= 0 and v + w <= 1 and t > 0 else None
+
+
+def minus(a, b):
+    return [x - y for x, y in zip(a, b)]
+
+
+def cross(a, b):
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
 def dot(a, b):
