@@ -79,7 +79,7 @@ class Plan:
     @property
     def on_screen(self) -> bool:
         """Whether the spheres are sorted into tiles of the screen, and traced there."""
-        return self.method == CERTIFIED and self.path is not plain
+        return self.method == CERTIFIED and self.path is not plain and self.stage.needs_hits
 
     @cached_property
     def painter(self) -> str:
