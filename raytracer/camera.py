@@ -178,7 +178,8 @@ def rows_of(grid: Grid, rows: slice) -> Grid:
 def squares(grid: Grid, rows: slice = slice(None), columns: slice = slice(None)) -> np.ndarray:
     """D·D of a grid's rays: (rows, columns)."""
     across = grid.across[None, columns]
-    return (across * grid.a2 + grid.a1[rows, None]) * across + grid.a0[rows, None]
+    found: np.ndarray = (across * grid.a2 + grid.a1[rows, None]) * across + grid.a0[rows, None]
+    return found
 
 
 def directions(grid: Grid, rows: slice = slice(None), columns: slice = slice(None)) -> Vectors:
