@@ -116,10 +116,15 @@ class Picture:
         rows = min(max(1, _BAND_PIXELS // (self.width * self.rays_a_pixel)), max(_TILE, self.height // _BANDS))
         return min(rows // _TILE * _TILE or rows, self.height)
 
-    def bands(self) -> list[slice]:
+    @property
+    def starts(self) -> range:
+        """The first row of each such piece."""
+        return range(0, self.height, self.rows_a_band)
+
+    def bands(self) -> Iterator[slice]:
         """Its rows in such pieces."""
-        step = self.rows_a_band
-        return [slice(start, min(start + step, self.height)) for start in range(0, self.height, step)]
+        starts = self.starts
+        return (slice(start, min(start + starts.step, self.height)) for start in starts)
 
 
 @cache
@@ -192,11 +197,11 @@ def draw_large(
     if stage.needs_whole and not (stage.needs_range or stage.needs_next_row):
         raise ValueError(f"stage {picture.stage!r} looks at the whole picture, which cannot be drawn in bands then")
     check_fits(picture, path, crew.workers())
-    bands = picture.bands()
+    bands = len(picture.starts)
     with kept_beside(path, picture.digest) as folder:
         if begun is not None:
-            begun(len(bands), folder)
-        count = len(bands) * (2 if stage.needs_range else 1)
+            begun(bands, folder)
+        count = bands * (2 if stage.needs_range else 1)
         shelf, reach = Shelf(folder, crew, count, progress), None
         if stage.needs_range:
             reaches = shelf.filled(find_reach, lambda: _parts(picture, "reach", None))
