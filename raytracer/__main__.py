@@ -40,9 +40,16 @@ def render(arguments: argparse.Namespace) -> int:
         if drawn is not None:
             save_png(arguments.output, drawn)
             return 0
-    crew = {"cluster": arguments.cluster, "threads": arguments.threads}
     with _progress("bands") as show:
-        tally = write_picture(picture, arguments.output, **crew, progress=show, cancelled=interrupts.came)
+        tally = write_picture(
+            picture,
+            arguments.output,
+            cluster=arguments.cluster,
+            threads=arguments.threads,
+            progress=show,
+            cancelled=interrupts.came,
+            begun=_say_where,
+        )
     if tally is not None:
         print(tally, file=sys.stderr)
     return 0
@@ -228,6 +235,10 @@ def _picture(arguments: argparse.Namespace, depth: Depth = Depth.BYTE) -> Pictur
     return picture
 
 
+def _say_where(bands: int, folder: Path) -> None:
+    print(f"drawn in {bands} bands, which are kept in {folder} until all are there", file=sys.stderr)
+
+
 @contextmanager
 def _progress(unit: str) -> Iterator[Progress]:
     """A bar on a terminal, after a second."""
@@ -247,11 +258,40 @@ def _plan(arguments: argparse.Namespace) -> Plan:
 
 def size(text: str) -> tuple[int, int]:
     """WxH, or one number for a square."""
-    width, _, height = text.lower().partition("x")
+    width, times, height = text.lower().partition("x")
     try:
-        return int(width), int(height or width)
+        found = int(width), int(height if times else width)
     except ValueError:
-        raise argparse.ArgumentTypeError(f"found {text!r}, expected WIDTHxHEIGHT, such as 640x480") from None
+        found = 0, 0
+    if min(found) < 1:
+        message = f"found {text!r}, expected WIDTHxHEIGHT, such as 640x480, of whole numbers from 1"
+        raise argparse.ArgumentTypeError(message)
+    return found
+
+
+def picture_file(text: str) -> Path:
+    """What `render` can write."""
+    from raytracer.output import SUFFIXES
+
+    return _file(text, SUFFIXES)
+
+
+def film_file(text: str) -> Path:
+    """What `turntable` can write."""
+    from raytracer.turntable import WRITERS
+
+    return _file(text, tuple(WRITERS))
+
+
+def _file(text: str, suffixes: tuple[str, ...]) -> Path:
+    from raytracer.output import check_suffix
+
+    path = Path(text)
+    try:
+        check_suffix(path, suffixes)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+    return path
 
 
 def count(text: str) -> int:
@@ -337,7 +377,12 @@ COMMANDS: dict[str, tuple[Callable[[argparse.Namespace], int], tuple[Argument, .
             _SCENE,
             Argument(
                 ("-o", "--output"),
-                {"metavar": "OUT.png", "type": Path, "required": True, "help": "the file to write, or an OUT.exr"},
+                {
+                    "metavar": "OUT.png",
+                    "type": picture_file,
+                    "required": True,
+                    "help": "the file to write, or an OUT.exr",
+                },
             ),
             *_PICTURE,
             _SAMPLES,
@@ -363,7 +408,12 @@ COMMANDS: dict[str, tuple[Callable[[argparse.Namespace], int], tuple[Argument, .
             _SCENE,
             Argument(
                 ("-o", "--output"),
-                {"metavar": "OUT.gif", "type": Path, "required": True, "help": "or an OUT.mp4, or a folder for PNGs"},
+                {
+                    "metavar": "OUT.gif",
+                    "type": film_file,
+                    "required": True,
+                    "help": "or an OUT.mp4, or a folder for PNGs",
+                },
             ),
             Argument(
                 ("--frames",), {"metavar": "N", "type": count, "default": 100, "help": "25 a second, default 100"}

@@ -28,7 +28,7 @@ from raytracer.twofold import Number, Twofold, add, multiply, two_product
 
 SAMPLINGS = {"corner": 0, "centre": 1}  # what is added to 2x and 2y
 
-_LARGEST_SIDE = (1 << 31) - 1
+_LARGEST_SIDE = (1 << 31) - 1  # that a PNG can name
 _SKEWED = 1e3  # a frame whose inverse magnifies rounding by more than this
 _BAND_TESTS = 1 << 22
 BAND_PIXELS = 1 << 15  # enough to outweigh what a task costs, few enough to stay in a core's cache
@@ -178,7 +178,8 @@ def rows_of(grid: Grid, rows: slice) -> Grid:
 def squares(grid: Grid, rows: slice = slice(None), columns: slice = slice(None)) -> np.ndarray:
     """D·D of a grid's rays: (rows, columns)."""
     across = grid.across[None, columns]
-    return (across * grid.a2 + grid.a1[rows, None]) * across + grid.a0[rows, None]
+    found: np.ndarray = (across * grid.a2 + grid.a1[rows, None]) * across + grid.a0[rows, None]
+    return found
 
 
 def directions(grid: Grid, rows: slice = slice(None), columns: slice = slice(None)) -> Vectors:

@@ -126,11 +126,13 @@ def _off(found: np.ndarray, expected: np.ndarray) -> np.ndarray:
     if found.shape != expected.shape:
         sizes = (f"{picture.shape[1]} x {picture.shape[0]}" for picture in (found, expected))
         raise ValueError("found a picture of {} pixels, expected {}".format(*sizes))
-    return np.maximum(found, expected) - np.minimum(found, expected)
+    off_by: np.ndarray = np.maximum(found, expected) - np.minimum(found, expected)
+    return off_by
 
 
 def _worst(off: np.ndarray) -> np.ndarray:
-    return np.maximum(np.maximum(off[..., 0], off[..., 1]), off[..., 2])
+    worst: np.ndarray = np.maximum(np.maximum(off[..., 0], off[..., 1]), off[..., 2])
+    return worst
 
 
 def _counts(off: np.ndarray) -> np.ndarray:

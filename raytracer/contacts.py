@@ -75,7 +75,8 @@ def missed(name: str, contact: Contact) -> np.ndarray:
     t, other_root = truth(contact)
     found = OFFSETS[name].meets(contact.rays, contact.other)
     with np.errstate(invalid="ignore"):
-        return ~(np.abs(found - t) <= np.abs(found - other_root)) | (found == np.inf)
+        misses: np.ndarray = ~(np.abs(found - t) <= np.abs(found - other_root)) | (found == np.inf)
+        return misses
 
 
 def truth(contact: Contact) -> tuple[np.ndarray, np.ndarray]:
@@ -201,7 +202,10 @@ def _about(rng: np.random.Generator, places: np.ndarray, normals: np.ndarray, si
     """Triangles about places, their corners as far away as their sizes: (n, 3, 3)."""
     first = _beside(rng, normals)
     second, across = -0.5 * first, np.sqrt(0.75) * np.cross(normals, first)
-    return places[:, None] + sizes[:, None, None] * np.stack([first, second + across, second - across], axis=1)
+    corners: np.ndarray = places[:, None] + sizes[:, None, None] * np.stack(
+        [first, second + across, second - across], axis=1
+    )
+    return corners
 
 
 def _places(rng: np.random.Generator, scale: float, count: int) -> np.ndarray:
@@ -210,13 +214,15 @@ def _places(rng: np.random.Generator, scale: float, count: int) -> np.ndarray:
 
 def _units(rng: np.random.Generator, count: int) -> np.ndarray:
     vectors = rng.normal(size=(count, 3))
-    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+    units: np.ndarray = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+    return units
 
 
 def _beside(rng: np.random.Generator, axes: np.ndarray) -> np.ndarray:
     """Unit vectors at right angles to these."""
     vectors = np.cross(axes, _units(rng, len(axes)))
-    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+    beside: np.ndarray = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+    return beside
 
 
 def _turned(vectors: np.ndarray, normals: np.ndarray) -> np.ndarray:

@@ -226,7 +226,8 @@ def certain_misses(origins: np.ndarray, rays: TwofoldRays, corners: np.ndarray) 
     a, edges = corners - origins[:, None], corners[:, _NEXT] - corners
     size = _length(a) * _length(edges) * rays.reach[:, None]
     side = _dot(np.cross(a, edges), np.stack(rays[:3], axis=-1)[:, None])
-    return (side > FACET_ERROR * size).any(axis=1) & (side < -FACET_ERROR * size).any(axis=1)
+    missed: np.ndarray = (side > FACET_ERROR * size).any(axis=1) & (side < -FACET_ERROR * size).any(axis=1)
+    return missed
 
 
 def fine_distance(origins: np.ndarray, rays: TwofoldRays, corners: np.ndarray) -> np.ndarray:
@@ -235,7 +236,8 @@ def fine_distance(origins: np.ndarray, rays: TwofoldRays, corners: np.ndarray) -
     normal = _fine_cross(_difference(second, first), _difference(third, second))
     x, y, z, x_low, y_low, z_low, _ = rays
     over = _fine_dot(normal, _difference(first, origins))
-    return divide(*over, *_fine_dot(normal, ((x, x_low), (y, y_low), (z, z_low))))[0]
+    t: np.ndarray = divide(*over, *_fine_dot(normal, ((x, x_low), (y, y_low), (z, z_low))))[0]
+    return t
 
 
 def _difference(a: np.ndarray, b: np.ndarray) -> TwofoldVector:
@@ -269,8 +271,10 @@ def exact_volume(origin: np.ndarray, corners: np.ndarray) -> float:
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     product = a * b
-    return product[..., 0] + product[..., 1] + product[..., 2]
+    dot: np.ndarray = product[..., 0] + product[..., 1] + product[..., 2]
+    return dot
 
 
 def _length(vectors: np.ndarray) -> np.ndarray:
-    return np.sqrt(_dot(vectors, vectors))
+    length: np.ndarray = np.sqrt(_dot(vectors, vectors))
+    return length

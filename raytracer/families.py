@@ -213,7 +213,8 @@ def _changed(bundle: Bundle, length: float = 1.0, direction: np.ndarray | float 
 
 def _units(rng: np.random.Generator, count: int) -> np.ndarray:
     vectors = rng.normal(size=(count, 3))
-    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+    units: np.ndarray = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+    return units
 
 
 def _frame(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -42,7 +42,8 @@ def to_screen(x: Array, y: Array, width: int, height: int) -> Place:
 def eye_ray(camera: Camera, U: Array, V: Array, d: float) -> Array:
     """U·u + V·v − d·w"""
     u, v, w = np.array([camera.u, camera.v, camera.w])
-    return U[:, None] * u + V[:, None] * v - d * w
+    D: Array = U[:, None] * u + V[:, None] * v - d * w
+    return D
 
 
 def nearest_ahead(near: Array, far: Array, least: Array) -> Array:
@@ -52,11 +53,13 @@ def nearest_ahead(near: Array, far: Array, least: Array) -> Array:
 
 def nearest(t: Array) -> Array:
     """Which of the shapes (n, m), in the order of the file, is seen: (n,). Those that are missed have t = +inf."""
-    return t.argmin(axis=1)
+    first: Array = t.argmin(axis=1)
+    return first
 
 
 def ball_normal(P: Array, centre: Array, radius: Array) -> Array:
-    return (P - centre) / radius[:, None]
+    N: Array = (P - centre) / radius[:, None]
+    return N
 
 
 def facet_normal(normal: Array, D: Array) -> Array:
@@ -70,11 +73,13 @@ def to_light(P: Array, light: Array) -> Array:
 
 
 def lit_side(cosine: Array) -> Array:
-    return np.maximum(0.0, cosine)
+    lit: Array = np.maximum(0.0, cosine)
+    return lit
 
 
 def matt(diffuse: Array, light: Array, cosine: Array) -> Array:
-    return diffuse * light * cosine
+    back: Array = diffuse * light * cosine
+    return back
 
 
 def half_way(N: Array, L: Array, D: Array) -> Array:
@@ -83,11 +88,13 @@ def half_way(N: Array, L: Array, D: Array) -> Array:
 
 
 def power_of(spark: Array, power: Array) -> Array:
-    return np.maximum(0.0, spark) ** power
+    shine: Array = np.maximum(0.0, spark) ** power
+    return shine
 
 
 def shiny(specular: Array, light: Array, spark: Array) -> Array:
-    return specular * light * spark
+    shine: Array = specular * light * spark
+    return shine
 
 
 def all_lights(lights: Sequence[Light]) -> Sequence[Light]:
@@ -104,11 +111,13 @@ def between(near: Array, far: Array, least: Array, distance: Array) -> Array:
 
 
 def mirrored(D: Array, N: Array) -> Array:
-    return D - 2 * dot(N, D)[:, None] * N
+    mirrored: Array = D - 2 * dot(N, D)[:, None] * N
+    return mirrored
 
 
 def added(local: Array, reflected: Array, k: Array) -> Array:
-    return local + k * reflected
+    added: Array = local + k * reflected
+    return added
 
 
 def unchanged(colour: Colour) -> Colour:
@@ -236,7 +245,8 @@ class Guide:
         """Whether something hides a light from points on shapes: bool (n,)."""
         away = light - P
         distance = np.sqrt(dot(away, away))[:, None]
-        return np.any(steps.blocks(*self._roots(steps, P, away / distance, shape), distance), axis=1)
+        blocked: Array = np.any(steps.blocks(*self._roots(steps, P, away / distance, shape), distance), axis=1)
+        return blocked
 
     def reflected(self, steps: Steps, at: _Arrival, which: Array) -> Array:
         D, beyond = steps.mirror(at.D[which], at.N[which]), steps.beyond(self.scene.background)
@@ -275,7 +285,8 @@ class Guide:
     def materials(self) -> Array:
         """As in `Materials.table`: (m, 11)."""
         rows = self._of_shapes(self.scene.spheres.material, self.scene.triangles.material)
-        return self.scene.materials.table[rows]
+        materials: Array = self.scene.materials.table[rows]
+        return materials
 
     def _of_shapes(self, balls: Array, facets: Array) -> Array:
         """What is known of spheres and of triangles, in the order of the file."""
@@ -310,13 +321,14 @@ def diffuse(guide: Guide, steps: Steps, at: _Arrival) -> Array:
     for light in lights:
         cosine = steps.cosine(dot(at.N, steps.to_light(at.P, np.array(light.position))))
         total += steps.matt(material[:, 0:3], np.array(light.colour), cosine[:, None])
-    return steps.extra(material[:, 3:6]) + steps.share(total, len(lights))
+    colours: Array = steps.extra(material[:, 3:6]) + steps.share(total, len(lights))
+    return colours
 
 
 def full(guide: Guide, steps: Steps, at: _Arrival) -> Array:
     """ambient + k_refl · C(mirrored) + Σ over unshadowed lights of light · (diffuse · max(0, N·L) + specular · …)"""
     material, lights = guide.materials[at.shape], steps.lights(guide.scene.lights)
-    total = np.zeros_like(at.P)
+    total: Array = np.zeros_like(at.P)
     for light in lights:
         place, colour = np.array(light.position), np.array(light.colour)
         L = steps.to_light(at.P, place)
@@ -336,7 +348,8 @@ LOOKS = {"hit": one_colour, "outline": one_colour, "normal": normal, "diffuse": 
 
 
 def dot(a: Array, b: Array) -> Array:
-    return np.einsum("...k,...k->...", a, b)
+    products: Array = np.einsum("...k,...k->...", a, b)
+    return products
 
 
 def unit(vectors: Array) -> Array:

@@ -72,8 +72,10 @@ class Depth(Enum):
         colours = np.nan_to_num(colours)
         if self is Depth.FLOAT:
             largest = np.finfo(np.float32).max
-            return np.clip(colours, -largest, largest).astype(np.float32)
-        return (np.clip(colours, 0.0, 1.0) * self.white + 0.5).astype(self.kind)
+            numbers: np.ndarray = np.clip(colours, -largest, largest)
+        else:
+            numbers = np.clip(colours, 0.0, 1.0) * self.white + 0.5
+        return numbers.astype(self.kind)
 
 
 def to_bytes(colours: np.ndarray) -> np.ndarray:

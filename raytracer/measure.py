@@ -199,7 +199,8 @@ def _truths(bundle: Bundle) -> Iterator[tuple[float, float, int, float]]:
 
 
 def _lengths(vectors: np.ndarray) -> np.ndarray:
-    return np.hypot(np.hypot(vectors[:, 0], vectors[:, 1]), vectors[:, 2])
+    lengths: np.ndarray = np.hypot(np.hypot(vectors[:, 0], vectors[:, 1]), vectors[:, 2])
+    return lengths
 
 
 def trace(racer: Racer, bundle: Bundle) -> Hits:

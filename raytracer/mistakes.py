@@ -110,7 +110,8 @@ def _no_frame(camera: Camera) -> Camera:
 
 def _backwards(camera: Camera, U: Array, V: Array, d: float) -> Array:
     u, v, w = np.array([camera.u, camera.v, camera.w])
-    return U[:, None] * u + V[:, None] * v + d * w
+    D: Array = U[:, None] * u + V[:, None] * v + d * w
+    return D
 
 
 def _plus_eye(camera: Camera, U: Array, V: Array, d: float) -> Array:
@@ -131,23 +132,28 @@ def _behind_too(near: Array, far: Array, least: Array) -> Array:
 
 
 def _last(t: Array) -> Array:
-    return t.shape[1] - 1 - np.isfinite(t)[:, ::-1].argmax(axis=1)
+    last: Array = t.shape[1] - 1 - np.isfinite(t)[:, ::-1].argmax(axis=1)
+    return last
 
 
 def _first(t: Array) -> Array:
-    return np.isfinite(t).argmax(axis=1)
+    first: Array = np.isfinite(t).argmax(axis=1)
+    return first
 
 
 def _farthest(t: Array) -> Array:
-    return np.where(np.isfinite(t), t, -np.inf).argmax(axis=1)
+    farthest: Array = np.where(np.isfinite(t), t, -np.inf).argmax(axis=1)
+    return farthest
 
 
 def _times_r(P: Array, centre: Array, radius: Array) -> Array:
-    return P - centre
+    N: Array = P - centre
+    return N
 
 
 def _inwards(P: Array, centre: Array, radius: Array) -> Array:
-    return (centre - P) / radius[:, None]
+    N: Array = (centre - P) / radius[:, None]
+    return N
 
 
 def _from_origin(P: Array, centre: Array, radius: Array) -> Array:
@@ -171,7 +177,8 @@ def _long_normal(normal: Array, D: Array) -> Array:
 
 
 def _long(P: Array, light: Array) -> Array:
-    return light - P
+    L: Array = light - P
+    return L
 
 
 def _from_light(P: Array, light: Array) -> Array:
@@ -183,7 +190,8 @@ def _position(P: Array, light: Array) -> Array:
 
 
 def _faded(diffuse: Array, light: Array, cosine: Array) -> Array:
-    return diffuse * cosine
+    faded: Array = diffuse * cosine
+    return faded
 
 
 def _srgb(C: Array) -> Array:
@@ -197,11 +205,13 @@ def _gamma(C: Array) -> Array:
 
 
 def _cut_off(C: Array) -> Array:
-    return (np.clip(np.nan_to_num(C), 0.0, 1.0) * 255.0).astype(np.uint8)
+    numbers: Array = (np.clip(np.nan_to_num(C), 0.0, 1.0) * 255.0).astype(np.uint8)
+    return numbers
 
 
 def _wrapped(C: Array) -> Array:
-    return (np.nan_to_num(C) * 255.0 + 0.5).astype(np.int64).astype(np.uint8)
+    numbers: Array = (np.nan_to_num(C) * 255.0 + 0.5).astype(np.int64).astype(np.uint8)
+    return numbers
 
 
 def _nothing(t: Array) -> Array:
@@ -231,7 +241,8 @@ def _never(near: Array, far: Array, least: Array, distance: Array) -> Array:
 
 
 def _into_the_mirror(D: Array, N: Array) -> Array:
-    return 2 * dot(N, D)[:, None] * N - D
+    R: Array = 2 * dot(N, D)[:, None] * N - D
+    return R
 
 
 def _mean(total: Array, lights: int) -> Array:
@@ -483,7 +494,8 @@ def share_of(tells: Array, explained: Array) -> float:
 
 def _off(a: Array, b: Array) -> Array:
     """By how much colours (n, 3) differ in their worst byte: (n,)."""
-    return np.abs(a.astype(np.int16) - b).max(axis=1)
+    off_by: Array = np.abs(a.astype(np.int16) - b).max(axis=1)
+    return off_by
 
 
 def _gather(

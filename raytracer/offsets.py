@@ -75,7 +75,8 @@ def not_moved(p: np.ndarray, n: np.ndarray) -> np.ndarray:
 
 
 def moved_by_a_length(p: np.ndarray, n: np.ndarray) -> np.ndarray:
-    return p + p.dtype.type(1e-4) * n
+    moved: np.ndarray = p + p.dtype.type(1e-4) * n
+    return moved
 
 
 def moved_by_ulps(p: np.ndarray, n: np.ndarray) -> np.ndarray:
@@ -90,7 +91,8 @@ def moved_by_ulps(p: np.ndarray, n: np.ndarray) -> np.ndarray:
     whole, float_scale = (np.int32, 2.0**-16) if single else (np.int64, 2.0**-45)
     ulps = (np.where(p < 0.0, -256.0, 256.0) * n).astype(whole)
     by_ulps = (p.view(whole) + ulps).view(p.dtype)
-    return np.where(np.abs(p) < 1.0 / 32.0, p + p.dtype.type(float_scale) * n, by_ulps)
+    moved: np.ndarray = np.where(np.abs(p) < 1.0 / 32.0, p + p.dtype.type(float_scale) * n, by_ulps)
+    return moved
 
 
 _COURSES = "the advice of most courses, as P. Shirley, Ray Tracing in One Weekend, 6: “shadow acne”"
@@ -109,13 +111,15 @@ def seen_from(shapes: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Shapes moved by −points, a point each: (n, 3)."""
     if _are_spheres(shapes):
         return np.column_stack([shapes[:, :3] - points, shapes[:, 3]])
-    return shapes - points[:, None]
+    seen: np.ndarray = shapes - points[:, None]
+    return seen
 
 
 def meets_exactly(points: np.ndarray, directions: np.ndarray, shapes: np.ndarray) -> np.ndarray:
     """t of the first hit of each ray on its own sphere, +inf for none: (n,). Two-fold float64, and integers where
     that cannot tell. For triangles, whose edges are not looked at, where the ray meets the plane, in float64.
     """
+    t: np.ndarray
     if not _are_spheres(shapes):
         normal = np.cross(shapes[:, 1] - shapes[:, 0], shapes[:, 2] - shapes[:, 1])
         t = ((shapes[:, 0] - points) * normal).sum(axis=1) / (directions * normal).sum(axis=1)
@@ -180,7 +184,8 @@ def _meet_bounced(rays: Leaving, shapes: np.ndarray, own: np.bool_) -> np.ndarra
     if _are_spheres(shapes):
         x, y, z, radius = shapes.T
         o = p[0] - x, p[1] - y, p[2] - z
-        return bounce.meet_sphere(o, d, a, 1.0 / a, radius, size, own, False)
+        t: np.ndarray = bounce.meet_sphere(o, d, a, 1.0 / a, radius, size, own, False)
+        return t
     x, y, z, w = planes_of(np.zeros(3), shapes).T
     reach = np.abs(shapes).sum(axis=2).max(axis=1)
     over, under = bounce.plane_ahead(p, d, (x, y, z, w), reach, size, own)

@@ -33,14 +33,16 @@ def _rotation(camera: Camera, around: float, over: float) -> np.ndarray:
     frame, _ = _unit_frame(camera)
     hand = -1.0 if np.linalg.det(frame) < 0 else 1.0
     u, v, _ = hand * frame
-    return _about(v, around) @ _about(u, over)
+    rotation: np.ndarray = _about(v, around) @ _about(u, over)
+    return rotation
 
 
 def _about(axis: np.ndarray, angle: float) -> np.ndarray:
     """The rotation about a unit vector (O. Rodrigues, 1840)."""
     x, y, z = axis
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + sin(angle) * cross + (1 - cos(angle)) * (cross @ cross)
+    rotation: np.ndarray = np.eye(3) + sin(angle) * cross + (1 - cos(angle)) * (cross @ cross)
+    return rotation
 
 
 def _unit_frame(camera: Camera) -> tuple[np.ndarray, np.ndarray]:
@@ -55,7 +57,8 @@ def _unit_frame(camera: Camera) -> tuple[np.ndarray, np.ndarray]:
 def _length(vectors: np.ndarray) -> np.ndarray:
     """Also of vectors whose squares are beyond float64."""
     x, y, z = vectors.T
-    return np.hypot(np.hypot(x, y), z)
+    length: np.ndarray = np.hypot(np.hypot(x, y), z)
+    return length
 
 
 def _is_usable(camera: Camera) -> bool:

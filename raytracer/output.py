@@ -12,7 +12,7 @@ from raytracer.crew import Tally, open_crew
 from raytracer.image import Depth, PictureTooLargeError, check_can_save, is_file_to_be, save_png
 from raytracer.render import Progress
 from raytracer.samples import draw_samples
-from raytracer.tiled import Picture, draw_large
+from raytracer.tiled import Begun, Picture, draw_large
 
 _AT_ONCE = 1 << 26  # pixels: of more, the finished parts are worth keeping, and memory may be short
 SUFFIXES = (".png", ".exr")
@@ -26,9 +26,11 @@ def write_picture(
     threads: int | None = None,
     progress: Progress | None = None,
     cancelled: Callable[[], bool] | None = None,
+    begun: Begun | None = None,
 ) -> Tally | None:
     """Draw a picture into a file, whole or not at all; what the workers did, if it was drawn in bands.
 
+    `begun` is called for one that is too large to be drawn at once, whoever draws it.
     Raises ValueError for a file of another kind, and what `draw_large` and `raytracer.exr.save_exr` do.
     """
     check_suffix(path, SUFFIXES)
@@ -45,7 +47,7 @@ def write_picture(
         save_png(path, pixels)
         return None
     with open_crew(cluster, threads) as crew:
-        draw_large(picture, path, crew, progress)
+        draw_large(picture, path, crew, progress, begun if picture.pixels > _AT_ONCE else None)
         return crew.tally
 
 

@@ -139,7 +139,8 @@ def refine_given(
     x, y, z = ((component[which], zero) for component in rays[:3])
     finer, sure = refine(t[which], x, y, z, *xyz(origins[which]), *xyz(spheres), spheres[:, 3])
     t[which] = np.where(sure, finer, t[which])
-    return which[~sure]
+    open_rays: np.ndarray = which[~sure]
+    return open_rays
 
 
 def nearest_twofold(
@@ -240,7 +241,8 @@ def polish(origins: np.ndarray, rays: TwofoldRays, balls: np.ndarray, known: tup
 
     known is what `known_sides` says of those spheres.
     """
-    return meet_twofold(*look_twofold(*xyz(origins), *xyz(balls), balls[:, 3], *known), *rays)[0]
+    t: np.ndarray = meet_twofold(*look_twofold(*xyz(origins), *xyz(balls), balls[:, 3], *known), *rays)[0]
+    return t
 
 
 def xyz(vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -55,10 +55,12 @@ def echo(line: str) -> None:
 
 
 def plugged_file(text: str) -> Path:
-    """The file that an argument names. Raises `argparse.ArgumentTypeError` if there is none."""
+    """The file that an argument names. Raises `argparse.ArgumentTypeError` if there is none, or it is not in Python."""
     path = Path(text)
     if not path.is_file():
         raise argparse.ArgumentTypeError(f"found {text!r}, which is no file, expected one in Python")
+    if path.suffix.lower() != ".py":
+        raise argparse.ArgumentTypeError(f"found {text!r}, expected a file in Python, whose name ends in .py")
     return path
 
 

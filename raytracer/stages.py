@@ -60,16 +60,19 @@ class Block:
         if not len(self.scene.triangles):
             return np.zeros(len(shape), bool)
         place = np.searchsorted(spheres, shape)
-        return np.append(spheres, -1)[place] != shape
+        flat: np.ndarray = np.append(spheres, -1)[place] != shape
+        return flat
 
     @cached_property
     def _number(self) -> np.ndarray:
         """Which sphere is hit, or which triangle: int (hits,)."""
-        scene, shape = self.scene, self.hits.index[self.hit]
+        scene = self.scene
+        shape: np.ndarray = self.hits.index[self.hit]
         if not len(scene.triangles):
             return shape
         spheres, facets = (np.searchsorted(table.order, shape) for table in (scene.spheres, scene.triangles))
-        return np.where(self._flat, facets, spheres)
+        numbers: np.ndarray = np.where(self._flat, facets, spheres)
+        return numbers
 
     @cached_property
     def _directions(self) -> Vectors:
@@ -95,7 +98,8 @@ class Block:
         """What is hit, in units: a sphere's centre and radius, or a triangle's plane: (hits, 4)."""
         _, eye, balls, corners = self._units
         if not self._flat.any():
-            return balls[self._number]
+            hit_balls: np.ndarray = balls[self._number]
+            return hit_balls
         rows = np.empty((len(self._number), 4))
         rows[~self._flat] = balls[self._number[~self._flat]]
         rows[self._flat] = planes_of(eye, corners[self._number[self._flat]])
@@ -104,7 +108,8 @@ class Block:
     @cached_property
     def _t(self) -> np.ndarray:
         """t of the hits, in units: (hits,)."""
-        return np.ldexp(self.hits.t[self.hit], -self._unit)
+        t: np.ndarray = np.ldexp(self.hits.t[self.hit], -self._unit)
+        return t
 
     @cached_property
     def _where(self) -> np.ndarray:
@@ -140,13 +145,15 @@ class Block:
     @cached_property
     def from_eye(self) -> np.ndarray:
         """From the eye to the hit point: (hits, 3). Keeps digits that the point itself may not have."""
-        return np.ldexp(np.stack(self._from_eye, axis=-1), self._unit)
+        vectors: np.ndarray = np.ldexp(np.stack(self._from_eye, axis=-1), self._unit)
+        return vectors
 
     @cached_property
     def normals(self) -> np.ndarray:
         """Unit normals at the hit points, a sphere's outwards, a triangle's towards the eye: (hits, 3)."""
         _, normal, radius = self._landed
-        return np.stack(normal, axis=-1) / radius[:, None]
+        normals: np.ndarray = np.stack(normal, axis=-1) / radius[:, None]
+        return normals
 
     @cached_property
     def points(self) -> np.ndarray:
@@ -165,7 +172,8 @@ class Block:
         x, y, z = np.ldexp(place, -nearer).tolist()
         _, normal, radius = self._landed
         facing, square = shading.towards(p, normal, (x, y, z))
-        return shading.cosine(facing, square, radius)
+        cosine: np.ndarray = shading.cosine(facing, square, radius)
+        return cosine
 
     @cached_property
     def diffuse(self) -> np.ndarray:
@@ -411,7 +419,8 @@ STAGES = {
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     product = a * b
-    return product[:, 0] + product[:, 1] + product[:, 2]
+    dot: np.ndarray = product[:, 0] + product[:, 1] + product[:, 2]
+    return dot
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:

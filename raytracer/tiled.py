@@ -17,10 +17,11 @@ import pickle
 import secrets
 import shutil
 import struct
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
 from functools import cache, cached_property, lru_cache
+from math import isqrt
 from pathlib import Path
 from tempfile import gettempdir
 from typing import TypeVar
@@ -41,10 +42,13 @@ _BAND_PIXELS = 1 << 22  # a second's work or less at most stages
 _TILE = 64  # rows: bands begin where the tiles of the screen do
 _BANDS = 16  # or more, if they have so many rows: enough for a few workers
 _ADAPTIVE_RAYS = 8  # a pixel, about
+_MOST_RAYS = 1 << 38  # of a picture: about 130,000 bands at most, and most of a day's work
+_RATE = 1e7  # rays a second, or less at most stages, by two cores of 2020 or so
 _REACH = struct.Struct("<2d")
 
 Reach = tuple[float, float]
 Job = TypeVar("Job")
+Begun = Callable[[int, Path], object]  # is told how many bands there are, and of the folder where they are kept
 
 
 class Cargo:
@@ -103,16 +107,24 @@ class Picture:
         return self.width * self.height
 
     @property
+    def rays_a_pixel(self) -> int:
+        return _ADAPTIVE_RAYS if self.samples == ADAPTIVE else int(self.samples)
+
+    @property
     def rows_a_band(self) -> int:
         """Of pieces of about equal work, which begin where tiles of the screen do, if they can."""
-        rays = _ADAPTIVE_RAYS if self.samples == ADAPTIVE else int(self.samples)
-        rows = min(max(1, _BAND_PIXELS // (self.width * rays)), max(_TILE, self.height // _BANDS))
+        rows = min(max(1, _BAND_PIXELS // (self.width * self.rays_a_pixel)), max(_TILE, self.height // _BANDS))
         return min(rows // _TILE * _TILE or rows, self.height)
 
-    def bands(self) -> list[slice]:
+    @property
+    def starts(self) -> range:
+        """The first row of each such piece."""
+        return range(0, self.height, self.rows_a_band)
+
+    def bands(self) -> Iterator[slice]:
         """Its rows in such pieces."""
-        step = self.rows_a_band
-        return [slice(start, min(start + step, self.height)) for start in range(0, self.height, step)]
+        starts = self.starts
+        return (slice(start, min(start + starts.step, self.height)) for start in starts)
 
 
 @cache
@@ -167,7 +179,13 @@ def find_reach(part: Part) -> bytes:
     return _REACH.pack(t.min(initial=float("inf")), t.max(initial=0.0))
 
 
-def draw_large(picture: Picture, path: str | os.PathLike[str], crew: Crew, progress: Progress | None = None) -> None:
+def draw_large(
+    picture: Picture,
+    path: str | os.PathLike[str],
+    crew: Crew,
+    progress: Progress | None = None,
+    begun: Begun | None = None,
+) -> None:
     """Draw a picture of any size into a PNG file, whole or not at all.
 
     Raises what `Picture.plan` does, `OSError`, `PictureTooLargeError`.
@@ -175,20 +193,38 @@ def draw_large(picture: Picture, path: str | os.PathLike[str], crew: Crew, progr
     check_can_save(path)
     path = Path(path).resolve()
     stage = picture.first_row().stage
+    check_work(picture)
     if stage.needs_whole and not (stage.needs_range or stage.needs_next_row):
         raise ValueError(f"stage {picture.stage!r} looks at the whole picture, which cannot be drawn in bands then")
     check_fits(picture, path, crew.workers())
-    bands = picture.bands()
+    bands = len(picture.starts)
     with kept_beside(path, picture.digest) as folder:
-        count = len(bands) * (2 if stage.needs_range else 1)
+        if begun is not None:
+            begun(bands, folder)
+        count = bands * (2 if stage.needs_range else 1)
         shelf, reach = Shelf(folder, crew, count, progress), None
         if stage.needs_range:
-            parts = {f"reach-{rows.start:010}": Part(picture, rows, None, version()) for rows in bands}
-            nears, fars = zip(*map(_REACH.unpack, shelf.filled(find_reach, parts)), strict=True)
+            reaches = shelf.filled(find_reach, lambda: _parts(picture, "reach", None))
+            nears, fars = zip(*map(_REACH.unpack, reaches), strict=True)
             reach = min(nears), max(fars)
-        parts = {f"band-{rows.start:010}": Part(picture, rows, reach, version()) for rows in bands}
-        done = map(Band.unpack, shelf.filled(draw_part, parts))
+        done = map(Band.unpack, shelf.filled(draw_part, lambda: _parts(picture, "band", reach)))
         save(path, lambda file: write_png(file, picture.width, picture.height, int(picture.depth.value), done))
+
+
+def _parts(picture: Picture, kind: str, reach: Reach | None) -> Iterator[tuple[str, Part]]:
+    """The picture's bands, each with the name of its file."""
+    return ((f"{kind}-{rows.start:010}", Part(picture, rows, reach, version())) for rows in picture.bands())
+
+
+def check_work(picture: Picture) -> None:
+    """Raise `PictureTooLargeError`, with the figures, for what takes longer than anybody waits."""
+    rays = picture.pixels * picture.rays_a_pixel
+    if rays > _MOST_RAYS:
+        raise PictureTooLargeError(
+            f"a picture of {picture.width} x {picture.height} pixels takes {rays:.3g} rays, "
+            f"{rays / _RATE / 3600:,.0f} hours or more at {_RATE / 1e6:g} million a second; "
+            f"expected {_MOST_RAYS:.3g} at most, as of {isqrt(_MOST_RAYS)} x {isqrt(_MOST_RAYS)} pixels"
+        )
 
 
 def check_fits(picture: Picture, path: Path, workers: int) -> None:
@@ -233,16 +269,24 @@ class Shelf:
     progress: Progress | None = None
     done: int = 0
 
-    def filled(self, work: Callable[[Job], bytes], jobs: dict[str, Job]) -> Iterator[bytes]:
-        """Have the jobs done that are not there yet, then what became of each, in their order."""
-        missing = {name: job for name, job in jobs.items() if not (self.folder / name).exists()}
-        for _ in range(len(jobs) - len(missing)):
+    def filled(self, work: Callable[[Job], bytes], jobs: Callable[[], Iterable[tuple[str, Job]]]) -> Iterator[bytes]:
+        """Have the jobs done that are not there yet, then what became of each, in their order.
+
+        The jobs, with the names of their files, are asked for twice, one by one: there may be very many.
+        """
+        names: dict[int, str] = {}  # of the jobs under way
+        for job, piece in self.crew.work(work, self._missing(jobs(), names)):
+            self._put(names.pop(id(job)), piece)
             self._tell()
-        names = {id(job): name for name, job in missing.items()}
-        for job, piece in self.crew.work(work, missing.values()):
-            self._put(names[id(job)], piece)
-            self._tell()
-        return ((self.folder / name).read_bytes() for name in jobs)
+        return ((self.folder / name).read_bytes() for name, _ in jobs())
+
+    def _missing(self, jobs: Iterable[tuple[str, Job]], names: dict[int, str]) -> Iterator[Job]:
+        for name, job in jobs:
+            if (self.folder / name).exists():
+                self._tell()
+            else:
+                names[id(job)] = name
+                yield job
 
     def _put(self, name: str, piece: bytes) -> None:
         draft = self.folder / f".{secrets.token_hex(8)}.part"

@@ -47,10 +47,10 @@ def film(picture: Picture, path: Path, frames: int, crew: Crew, progress: Progre
     digest = hashlib.sha256(repr([view.digest for view in views[:2]] + [frames]).encode()).hexdigest()[:16]
     path = path.resolve()
     with kept_beside(path, digest) as folder:
-        parts = {
-            f"frame-{k:04}.png": Part(view, slice(0, view.height), None, version()) for k, view in enumerate(views, 1)
-        }
-        writer.write(path, picture, frames, Shelf(folder, crew, frames, progress).filled(draw_frame, parts))
+        parts = [
+            (f"frame-{k:04}.png", Part(view, slice(0, view.height), None, version())) for k, view in enumerate(views, 1)
+        ]
+        writer.write(path, picture, frames, Shelf(folder, crew, frames, progress).filled(draw_frame, lambda: parts))
 
 
 def _views(picture: Picture, frames: int) -> Iterator[Picture]:

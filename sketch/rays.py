@@ -96,7 +96,8 @@ def _line(raster: Raster, start: np.ndarray, end: np.ndarray, colour: Bytes, opa
 
 def _as_long(direction: np.ndarray, other: np.ndarray) -> np.ndarray:
     """The direction about as long as another vector, lest one of the two is lost beside the other."""
-    return direction / np.abs(direction).max() * np.abs(other).max()
+    scaled: np.ndarray = direction / np.abs(direction).max() * np.abs(other).max()
+    return scaled
 
 
 def clipped(start: np.ndarray, end: np.ndarray, width: int, height: int) -> tuple[Place, Place, bool] | None:

@@ -5,6 +5,7 @@ import resource
 import signal
 import subprocess
 import sys
+import time
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from dataclasses import replace
 from itertools import pairwise
@@ -64,7 +65,7 @@ def test_rows_drawn_on_their_own_are_those_of_the_picture(path, stage, first, se
 def test_a_picture_in_bands_is_the_picture(stage, depth, tmp_path, small_bands):
     for scene in (SPHERES, STAR, HUGE):
         picture = Picture(Cargo(scene), stage, 100, 150, depth=depth)
-        assert len(picture.bands()) == 3
+        assert len(picture.starts) == 3
         with open_crew(threads=2) as crew:
             draw_large(picture, tmp_path / "x.png", crew)
         np.testing.assert_array_equal(read_png(tmp_path / "x.png"), draw(picture.plan()))
@@ -85,7 +86,7 @@ def test_other_processes_draw_the_same(tmp_path, small_bands):
         crew = Crew(executor, lambda: 2)
         draw_large(picture, tmp_path / "x.png", crew)
     np.testing.assert_array_equal(load_png(tmp_path / "x.png"), draw(picture.plan()))
-    assert crew.tally.jobs == 2 * len(picture.bands())
+    assert crew.tally.jobs == 2 * len(picture.starts)
     assert 0 < crew.tally.efficiency <= 1
     assert str(os.getpid()) not in {name.split(":")[1] for name in crew.tally.names}
 
@@ -105,7 +106,7 @@ def test_a_worker_that_takes_its_executor_with_it_leaves_the_finished_bands(tmp_
     assert not (tmp_path / "x.png").exists()
     with open_crew() as crew:
         draw_large(picture, tmp_path / "x.png", crew)
-    assert crew.tally.jobs <= len(picture.bands()) - 2
+    assert crew.tally.jobs <= len(picture.starts) - 2
     np.testing.assert_array_equal(load_png(tmp_path / "x.png"), draw(picture.plan()))
 
 
@@ -136,7 +137,7 @@ def test_whoever_is_interrupted_goes_on(stage, tmp_path, small_bands):
         assert len(list(tmp_path.iterdir())) == (1 if jobs == 0 else 2)
     seen, crew = [], Crew(Quitter(-1), lambda: 1)
     draw_large(picture, out, crew, lambda done, total, rows: seen.append((done, total)))
-    total = len(picture.bands()) * (2 if stage == "depth" else 1)
+    total = len(picture.starts) * (2 if stage == "depth" else 1)
     assert crew.tally.jobs == total - 7
     assert seen == [(k, total) for k in range(1, total + 1)]
     np.testing.assert_array_equal(load_png(out), draw(picture.plan()))
@@ -176,13 +177,35 @@ def test_a_stage_that_looks_anywhere_is_refused(tmp_path):
 
 @pytest.mark.parametrize(
     ("size", "message"),
-    [((10**6, 10**6), "GB on disk or more; .* GB are free"), ((2**31 - 1, 4), "GB to draw; .* GB of memory are free")],
+    [
+        ((2**19, 2**19), "GB on disk or more; .* GB are free"),
+        ((2**31 - 1, 4), "GB to draw; .* GB of memory are free"),
+        ((2**19, 2**19 + 1), "takes 2.75e.11 rays, 8 hours or more at 10 million a second; expected 2.75e.11 at most"),
+        ((3 * 10**6, 3 * 10**6), "takes 9e.12 rays, 250 hours or more"),
+    ],
 )
 def test_what_does_not_fit_is_refused_with_the_figures(size, message, tmp_path, monkeypatch):
-    monkeypatch.setattr(tiled, "disk_left", lambda path: 2 * 10**9)
+    monkeypatch.setattr(tiled, "disk_left", lambda path: 10**8)
     with open_crew() as crew, pytest.raises(PictureTooLargeError, match=message):
         draw_large(Picture(Cargo(SPHERES), "hit", *size), tmp_path / "x.png", crew)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("samples", [1, 256, "adaptive"])
+@pytest.mark.parametrize("width", [1 << 19, 5000, 3])
+def test_the_largest_picture_begins_at_once(width, samples, tmp_path, monkeypatch):
+    """Whatever its shape: its bands are few enough, and are named one by one."""
+    monkeypatch.setattr(tiled, "disk_left", lambda path: 10**15)
+    rays = Picture(Cargo(SPHERES), samples=samples).rays_a_pixel
+    picture = Picture(Cargo(SPHERES), "hit", width, min((1 << 38) // rays // width, 2**31 - 1), samples=samples)
+    told, start = [], time.process_time()
+    monkeypatch.setattr(tiled, "draw_part", lambda part: b"")
+    with pytest.raises(KeyboardInterrupt):
+        draw_large(picture, tmp_path / "x.png", Crew(Quitter(1), lambda: 1), begun=lambda *words: told.append(words))
+    assert time.process_time() - start < 1
+    assert told == [(len(picture.starts), tmp_path / f"x.png-{picture.digest}.parts")]
+    assert len(picture.starts) <= 1 << 17
+    assert [path.name for path in told[0][1].iterdir()] == ["band-0000000000"]
 
 
 def test_a_scene_that_is_unpickled_is_as_good_as_new():
@@ -227,7 +250,7 @@ def test_a_worker_that_is_killed_loses_nothing(cluster, tmp_path, small_bands):
 
     draw_large(picture, tmp_path / "x.png", crew, shoot)
     np.testing.assert_array_equal(load_png(tmp_path / "x.png"), draw(picture.plan()))
-    assert crew.tally.jobs == len(picture.bands()) == 40
+    assert crew.tally.jobs == len(picture.starts) == 40
 
 
 def test_a_client_that_comes_back_has_nothing_drawn_twice(cluster, tmp_path, small_bands):
@@ -244,7 +267,7 @@ def test_a_client_that_comes_back_has_nothing_drawn_twice(cluster, tmp_path, sma
     assert len(kept) >= 6
     crew = fresh(cluster)
     draw_large(picture, tmp_path / "x.png", crew)
-    assert crew.tally.jobs == len(picture.bands()) - len(kept)
+    assert crew.tally.jobs == len(picture.starts) - len(kept)
     np.testing.assert_array_equal(load_png(tmp_path / "x.png"), draw(picture.plan()))
 
 

@@ -71,7 +71,7 @@ def write_report(
 
 def page(name: str, entries: list[Entry], figures: Figures, tile: int, seconds: tuple[float, float]) -> str:
     """The text of the page; seconds are those of drawing and of measuring."""
-    return environment().get_template("page.html.j2").render(
+    html: str = environment().get_template("page.html.j2").render(
         name=name,
         entries=entries,
         stages=STAGES,
@@ -89,6 +89,7 @@ def page(name: str, entries: list[Entry], figures: Figures, tile: int, seconds: 
         machine=machine(),
         plots=plots,
     )  # fmt: skip
+    return html
 
 
 def wrong_entries(entries: Iterable[Entry]) -> list[tuple[Entry, dict[str, Tile]]]:
