@@ -46,6 +46,19 @@ def eye_ray(camera: Camera, U: Array, V: Array, d: float) -> Array:
     return D
 
 
+def meet_balls(O: Array, D: Array, length: Array, centres: Array, radii: Array) -> Place:  # noqa: E741
+    """Where rays meet spheres, by projecting the centre onto the ray: both roots, NaN for a miss, (n, m) each.
+
+    `length` (n, 1) is that of the direction before it was made 1, for those who solve a t² + b t + c = 0 with it.
+    """
+    x, y, z = (centres[None, :, k] - O[:, k, None] for k in range(3))
+    dx, dy, dz = (D[:, k, None] for k in range(3))
+    along = x * dx + y * dy + z * dz
+    x, y, z = x - along * dx, y - along * dy, z - along * dz
+    half_chord = np.sqrt(radii**2 - (x * x + y * y + z * z))
+    return along - half_chord, along + half_chord
+
+
 def nearest_ahead(near: Array, far: Array, least: Array) -> Array:
     """The smaller root if it lies ahead, else the larger one; +inf if neither does."""
     return np.where(near > least, near, np.where(far > least, far, np.inf))
@@ -142,6 +155,7 @@ class Steps:
     focal: Callable[[float], float] = focal_length
     frame: Callable[[Camera], Camera] = lambda camera: camera
     ray: Callable[[Camera, Array, Array, float], Array] = eye_ray
+    quadratic: Callable[[Array, Array, Array, Array, Array], Place] = meet_balls
     root: Callable[[Array, Array, Array], Array] = nearest_ahead
     seen: Callable[[Array], Array] = nearest
     ball: Callable[[Array, Array, Array], Array] = ball_normal
@@ -198,14 +212,18 @@ class Guide:
         x, y = steps.pixel(x, y, self.width, self.height)
         U, V = steps.screen(x + steps.shift, y + steps.shift, self.width, self.height)
         camera = steps.frame(self.scene.camera)
-        D = unit(steps.ray(camera, U, V, steps.focal(camera.fov)))
+        D = steps.ray(camera, U, V, steps.focal(camera.fov))
         _, elsewhere = STAGES[self.stage].flat(self.scene)
         O, own = np.array([camera.eye]), np.full(len(x), -1)  # noqa: E741 (the ray's origin)
         return self._along(steps, O, D, own, steps.background(elsewhere), steps.reflections)
 
     def _along(self, steps: Steps, O: Array, D: Array, own: Array, elsewhere: Colour, left: int) -> Array:  # noqa: E741
-        """The colours that come along rays from O, on shapes `own` or on none, −1; `left` reflections may follow."""
-        t, shape = self._hits(steps, O, D, own)
+        """The colours that come along rays from O, on shapes `own` or on none, −1; `left` reflections may follow.
+
+        D may be of any length here.
+        """
+        length, D = np.sqrt(dot(D, D))[:, None], unit(D)
+        t, shape = self._hits(steps, O, D, length, own)
         colours, hit = np.empty((len(D), 3)), np.isfinite(t)
         colours[...] = elsewhere
         if hit.any():
@@ -216,18 +234,26 @@ class Guide:
             )
         return colours
 
-    def _hits(self, steps: Steps, O: Array, D: Array, own: Array) -> tuple[Array, Array]:  # noqa: E741
+    def _hits(self, steps: Steps, O: Array, D: Array, length: Array, own: Array) -> Place:  # noqa: E741
         if not len(self.scene):
             return np.full(len(D), np.inf), np.full(len(D), -1)
-        t = steps.root(*self._roots(steps, O, D, own))
+        t = steps.root(*self._roots(steps, O, D, length, own))
         which = steps.seen(t)
         return t[np.arange(len(D)), which], which
 
-    def _roots(self, steps: Steps, O: Array, D: Array, own: Array) -> tuple[Array, Array, Array]:  # noqa: E741
+    def _roots(
+        self,
+        steps: Steps,
+        O: Array,  # noqa: E741
+        D: Array,
+        length: Array,
+        own: Array,
+    ) -> tuple[Array, Array, Array]:
         """Both roots of rays with all shapes, NaN where these are missed, and above what a root counts: (n, m)."""
         O = np.broadcast_to(O, D.shape) if own[:1].max(initial=-1) >= 0 else O  # noqa: E741
         near, far = (np.empty((len(D), len(self.scene))) for _ in range(2))
-        near[:, ~self.flat], far[:, ~self.flat] = _meet_balls(O, D, self.centres[~self.flat], self.radii[~self.flat])
+        balls = self.centres[~self.flat], self.radii[~self.flat]
+        near[:, ~self.flat], far[:, ~self.flat] = steps.quadratic(O, D, length, *balls)
         if len(self.corners):
             near[:, self.flat] = far[:, self.flat] = _meet_facets(O, D, self.triangles)
         if own[:1].max(initial=-1) < 0 or not steps.leaves:
@@ -245,7 +271,8 @@ class Guide:
         """Whether something hides a light from points on shapes: bool (n,)."""
         away = light - P
         distance = np.sqrt(dot(away, away))[:, None]
-        blocked: Array = np.any(steps.blocks(*self._roots(steps, P, away / distance, shape), distance), axis=1)
+        roots = self._roots(steps, P, away / distance, np.ones((len(P), 1)), shape)
+        blocked: Array = np.any(steps.blocks(*roots, distance), axis=1)
         return blocked
 
     def reflected(self, steps: Steps, at: _Arrival, which: Array) -> Array:
@@ -355,16 +382,6 @@ def dot(a: Array, b: Array) -> Array:
 def unit(vectors: Array) -> Array:
     length = np.sqrt(dot(vectors, vectors))
     return vectors / np.where(length > 0, length, 1.0)[..., None]
-
-
-def _meet_balls(O: Array, D: Array, centres: Array, radii: Array) -> Place:  # noqa: E741
-    """Where rays meet spheres, by projecting the centre onto the ray: (n, m) each."""
-    x, y, z = (centres[None, :, k] - O[:, k, None] for k in range(3))
-    dx, dy, dz = (D[:, k, None] for k in range(3))
-    along = x * dx + y * dy + z * dz
-    x, y, z = x - along * dx, y - along * dy, z - along * dz
-    half_chord = np.sqrt(radii**2 - (x * x + y * y + z * z))
-    return along - half_chord, along + half_chord
 
 
 class _Facets(NamedTuple):

@@ -7,17 +7,17 @@ wrong by it. Looked at are some thousand pixels, half of them wrong ones.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from itertools import chain, combinations
+from itertools import chain, combinations, product
 from time import perf_counter
 
 import numpy as np
 
 from raytracer.camera import focal_length
 from raytracer.compare import TOLERANCE, differences
-from raytracer.guide import LOOKS, Array, Guide, Place, Steps, dot, facet_normal, to_screen, unit
+from raytracer.guide import LOOKS, Array, Guide, Place, Steps, ball_normal, dot, facet_normal, to_screen, unit
 from raytracer.image import to_bytes
 from raytracer.render import render_scene
 from raytracer.scene import Camera, Colour, Light, Scene
@@ -30,6 +30,7 @@ _LOOKED_AT = 1024  # wrong pixels, and as many others
 _AT_FIRST = 32  # wrong pixels, and as many others, that a mistake is tried on before
 _KNOWN = 0.5  # of the wrong pixels must be such that the guide's tracer draws them rightly, if it makes no mistake
 _MOST_LIGHTS = 4
+_MOST_NAMED = 4
 _SECONDS = 1.5  # after which no more pairs of mistakes are tried
 MOST_SHAPES = 1000  # every shape is tested with every ray
 
@@ -42,9 +43,18 @@ class Mistake:
     instead: str
     allowed: bool = False  # it changes no byte by more than 1
     judge: Callable[[_Evidence], float] | None = None  # in place of `_Evidence.explained`
+    or_steps: tuple[
+        dict[str, object], ...
+    ] = ()  # the same mistake in tracers that do something else otherwise, rightly
+    alone: bool = False  # it is not tried together with others, nor where one of these is surely the cause
 
     def done(self, steps: Steps) -> Steps:
         return replace(steps, **self.steps)  # type: ignore[arg-type]
+
+    def ways(self, steps: Steps) -> Iterator[Steps]:
+        """All ways to make it."""
+        for each in (self.steps, *self.or_steps):
+            yield replace(steps, **each)  # type: ignore[arg-type]
 
 
 def _moved(columns: int, rows: int) -> Callable[[Array, Array, int, int], Place]:
@@ -119,6 +129,46 @@ def _plus_eye(camera: Camera, U: Array, V: Array, d: float) -> Array:
     return camera.eye + _backwards(camera, U, V, -d)
 
 
+@dataclass(frozen=True)
+class _Textbook:
+    """a t² + b t + c = 0, with something else in the place of one of its parts: a step `quadratic`.
+
+    a = D·D, b = 2 D·(O − C), c = |O − C|² − r²; t = (−b ± √(b² − 4ac)) / 2a.
+    """
+
+    b: Callable[[Array, Array, Array], Array] = lambda D, O, C: 2 * dot(D, O - C)  # noqa: E741
+    c: Callable[[Array, Array, Array], Array] = lambda O, C, r: dot(O - C, O - C) - r**2  # noqa: E741
+    under: Callable[[Array, Array, Array], Array] = lambda a, b, c: b * b - 4 * a * c  # the root
+    t: Callable[[Array, Array, Array], Array] = lambda a, b, root: (b + root) / (2 * a)  # of −b and ±root
+    a: Callable[[Array], Array] = lambda D: dot(D, D)
+    root: Callable[[Array], Array] = np.sqrt
+    normalised: bool = False  # D is made of length 1 before
+
+    def __call__(self, O: Array, D: Array, length: Array, centres: Array, radii: Array) -> Place:  # noqa: E741
+        length = np.ones_like(length) if self.normalised else length
+        D, O = (D * length)[:, None], O[:, None]  # noqa: E741
+        a, b, c = self.a(D), self.b(D, O, centres), self.c(O, centres, radii)
+        under = self.under(a, b, c)
+        root = np.where(under >= 0, self.root(under), np.nan)
+        return length * self.t(a, -b, -root), length * self.t(a, -b, root)
+
+
+def _unit_from_centre(P: Array, centre: Array, radius: Array) -> Array:
+    return unit(P - centre)
+
+
+def _quadratic(instead: str, lengths: Sequence[bool] = (False,), **parts: Callable[..., Array]) -> Mistake:
+    """A row for a part of the quadratic: with (P − C) / r and with unit(P − C).
+
+    `lengths` is (False, True) where it tells whether D is of length 1, and both are this mistake.
+    """
+    first, *others = (
+        {"quadratic": _Textbook(normalised=normalised, **parts), "ball": ball}
+        for normalised, ball in product(lengths, (ball_normal, _unit_from_centre))
+    )
+    return Mistake(first, instead, or_steps=tuple(others), alone=True)
+
+
 def _far(near: Array, far: Array, least: Array) -> Array:
     return np.where(far > least, far, np.inf)
 
@@ -187,6 +237,11 @@ def _from_light(P: Array, light: Array) -> Array:
 
 def _position(P: Array, light: Array) -> Array:
     return unit(np.broadcast_to(light, P.shape))
+
+
+def _by_square(P: Array, light: Array) -> Array:
+    L = light - P
+    return L / dot(L, L)[:, None]
 
 
 def _faded(diffuse: Array, light: Array, cosine: Array) -> Array:
@@ -267,10 +322,56 @@ def _acne(evidence: _Evidence) -> float:
     return share_of(evidence.wrong & dull, explained)
 
 
+QUADRATIC = "a = D·D, b = 2 D·(O − C), c = (O − C)·(O − C) − r², t = (−b ± √(b² − 4ac)) / 2a"
+ROOTS = "t = (−b ± √(b² − 4ac)) / 2a, all of it divided"
+DISCRIMINANT = "b² − 4ac with b = 2 D·(O − C), or h² − ac with h = D·(O − C)"
+CONSTANT = "c = (O − C)·(O − C) − r²"
 SHADING = "diffuse · light · max(0, N·L)"
 
 MISTAKES = {
     "nothing is hit": Mistake({"seen": _nothing}, "a ray hits where the discriminant is not negative and t > 0"),
+    # the quadratic: before what is as black, or misses as much
+    "t not divided by 2a": _quadratic(ROOTS, t=lambda a, b, root: b + root),
+    "t divided by a in place of 2a": _quadratic(ROOTS, t=lambda a, b, root: (b + root) / a),
+    "(−b − √disc) / 2 * a: times a": _quadratic(
+        "/ (2 * a): / and * go from left to right", t=lambda a, b, root: (b + root) / 2 * a
+    ),
+    "−b − √disc / 2a: only the root is divided": _quadratic(
+        "(−b − √disc) / 2a, in brackets", (False, True), t=lambda a, b, root: b + root / (2 * a)
+    ),
+    "−b − √disc / 2 * a: only the root, and times a": _quadratic(
+        "(−b − √disc) / (2 * a), in brackets", t=lambda a, b, root: b + root / 2 * a
+    ),
+    "−h − √disc / a: only the root is divided, h = D·(O − C)": _quadratic(
+        "(−h − √(h² − ac)) / a, in brackets", t=lambda a, b, root: b / 2 + root / (2 * a)
+    ),
+    "divided by 2a where h = D·(O − C) has no 2": _quadratic(
+        "(−h − √(h² − ac)) / a, or b = 2h", t=lambda a, b, root: (b + root) / (4 * a)
+    ),
+    "b without the 2": _quadratic(
+        "b = 2 D·(O − C) where the discriminant is b² − 4ac",
+        b=lambda D, O, C: dot(D, O - C),  # noqa: E741
+    ),
+    "a·c in place of 4·a·c": _quadratic(DISCRIMINANT, under=lambda a, b, c: b * b - a * c),
+    "b from C − O": _quadratic("b = 2 D·(O − C), or t = (b − √disc) / 2a", b=lambda D, O, C: 2 * dot(D, C - O)),  # noqa: E741
+    "c without − r²": _quadratic(CONSTANT, c=lambda O, C, r: dot(O - C, O - C) + 0 * r),  # noqa: E741
+    "c with + r²": _quadratic(CONSTANT, c=lambda O, C, r: dot(O - C, O - C) + r**2),  # noqa: E741
+    "r in place of r²": _quadratic(CONSTANT, c=lambda O, C, r: dot(O - C, O - C) - r),  # noqa: E741
+    "2r in place of r²": _quadratic(CONSTANT, c=lambda O, C, r: dot(O - C, O - C) - 2 * r),  # noqa: E741
+    "O not taken off: −C in place of O − C": _quadratic(
+        f"b = 2 D·(O − C), {CONSTANT}",
+        b=lambda D, O, C: 2 * dot(D, 0 * O - C),  # noqa: E741
+        c=lambda O, C, r: dot(C, C) - r**2,  # noqa: E741
+    ),
+    "|C|² in place of |O − C|²": _quadratic(CONSTANT, c=lambda O, C, r: dot(C, C) - r**2),  # noqa: E741
+    "C not taken off: O in place of O − C": _quadratic(
+        f"b = 2 D·(O − C), {CONSTANT}",
+        b=lambda D, O, C: 2 * dot(D, O - 0 * C),  # noqa: E741
+        c=lambda O, C, r: dot(O, O) - r**2,  # noqa: E741
+    ),
+    "a taken as 1, with D not normalised": _quadratic("a = D·D, or D / |D| before", a=lambda D: dot(D, D) * 0 + 1),
+    "no square root of the discriminant": _quadratic(ROOTS, (False, True), root=lambda under: under),
+    "no square root of h² − ac": _quadratic("t = (−h ± √(h² − ac)) / a", (False, True), root=lambda under: under / 2),
     "the lights add nothing": Mistake({"matt": lambda d, i, c: 0 * d * i, "shiny": lambda s, i, x: 0 * s}, SHADING),
     # the picture
     "upside down": Mistake({"pixel": _upside_down}, "row 0 is the top one, V = (H − 2y) / H"),
@@ -326,6 +427,7 @@ MISTAKES = {
     "negative N·L not clipped": Mistake({"cosine": lambda x: x}, "max(0, N·L), before it is added"),
     "|N·L| in place of max(0, N·L)": Mistake({"cosine": abs}, "a light behind a surface adds nothing"),
     "L not normalised": Mistake({"to_light": _long}, "L = (light − P) / |light − P|"),
+    "L divided by |L|², not by |L|": Mistake({"to_light": _by_square}, "|v| = √(v·v): unit(v) = v / √(v·v)"),
     "L from the light": Mistake({"to_light": _from_light}, "L = (light − P) / |light − P|"),
     "P not taken off L": Mistake({"to_light": _position}, "L = (light − P) / |light − P|"),
     "diffuse + light · max(0, N·L)": Mistake({"matt": lambda d, i, c: d + i * c}, SHADING),
@@ -363,8 +465,14 @@ MISTAKES = {
 }
 
 
+OF_THE_QUADRATIC = frozenset(name for name, mistake in MISTAKES.items() if "quadratic" in mistake.steps)
+A_QUADRATIC = "something in the quadratic"  # what these are called where too many of them draw the same
+
+
 def advice(cause: str) -> tuple[str, ...]:
     """What to do instead: a line for each mistake that a name `recognise` gives is of."""
+    if cause == A_QUADRATIC:
+        return (QUADRATIC,)
     return tuple(MISTAKES[name].instead for name in cause.split(", and ") if name in MISTAKES)
 
 
@@ -379,9 +487,10 @@ def recognise(
 ) -> tuple[str, ...]:
     """The mistakes that explain what is wrong with a picture of a scene, names in `MISTAKES`, the best one first.
 
-    Several are named where each would draw this picture; two that were made together are one name, with "and" between
-    them. Nothing if the picture is right, none is known, or the stage is not one that the guide's tracer draws (`LOOKS`
-    in `raytracer.guide`). `expected` is the right picture, if it is there already; `cancelled()` is asked now and then.
+    Several are named where each would draw this picture, many of the quadratic as `A_QUADRATIC`; two that were made
+    together are one name, with "and" between them. Nothing if the picture is right, none is known, or the stage is not
+    one that the guide's tracer draws (`LOOKS` in `raytracer.guide`). `expected` is the right picture, if it is there
+    already; `cancelled()` is asked now and then.
     Raises ValueError for what is no picture, uint8 (height, width, 3).
     """
     end = perf_counter() + _SECONDS
@@ -399,15 +508,21 @@ def recognise(
     names = [name for name, mistake in MISTAKES.items() if mistake.allowed == allowed]
     if evidence is None:
         return ()
-    found, active = _singles(evidence, names, cancelled)
+    found, active = _singles(evidence, [name for name in names if not MISTAKES[name].alone], cancelled)
+    if max(found.values(), default=0.0) < 1 or evidence.of_one_colour:
+        alone, _ = _singles(evidence, [name for name in names if MISTAKES[name].alone], cancelled)
+        found = {name: share for name in names if (share := found.get(name) or alone.get(name))}
     if not found and not allowed and np.ptp(picture.reshape(-1, 3), axis=0).any():
         found = _pairs(evidence, active, lambda: cancelled() or perf_counter() > end)
     return () if cancelled() else _best(found)
 
 
 def _best(found: dict[str, float]) -> tuple[str, ...]:
-    """Those that explain most."""
-    return tuple(name for name, share in found.items() if share == max(found.values()))
+    """Those that explain most; those of the quadratic under one name if there are many."""
+    best = [name for name, share in found.items() if share == max(found.values())]
+    if len(best) > _MOST_NAMED and len(OF_THE_QUADRATIC.intersection(best)) > 1:
+        best = [A_QUADRATIC if name in OF_THE_QUADRATIC else name for name in best]
+    return tuple(dict.fromkeys(best))
 
 
 def _singles(
@@ -419,13 +534,12 @@ def _singles(
         if cancelled():
             break
         mistake = MISTAKES[name]
-        steps = mistake.done(evidence.guide.steps)
         if mistake.judge is not None:
             share = mistake.judge(evidence)
         else:
-            drawn = evidence.first.drawn(steps)
-            active += [name] if (drawn != evidence.first.right).any() else []
-            share = evidence.first.share(steps, drawn) and evidence.explained(steps)
+            tried = [evidence.tried(steps) for steps in mistake.ways(evidence.guide.steps)]
+            share = max(share for share, _ in tried)
+            active += [name] if tried[0][1] else []
         if share:
             found[name] = share
     return found, active
@@ -468,6 +582,11 @@ class _Evidence:
         some = (np.flatnonzero(which)[:_AT_FIRST] for which in (self.wrong, ~self.wrong))
         return self[np.concatenate(list(some))]
 
+    @property
+    def of_one_colour(self) -> bool:
+        """All that is wrong: it is black or missed, for which there are many causes."""
+        return not np.ptp(self.found[self.wrong], axis=0).any()
+
     def drawn(self, steps: Steps) -> Array:
         """As the tracer of these steps draws them."""
         return self.guide.paint(steps, self.x, self.y)
@@ -475,6 +594,11 @@ class _Evidence:
     def explained(self, steps: Steps) -> float:
         """How much of what is wrong, or would be, is as the tracer of these steps draws it; 0 if not nearly all."""
         return self.share(steps, self.drawn(steps))
+
+    def tried(self, steps: Steps) -> tuple[float, bool]:
+        """`explained`, and whether these steps change anything; few pixels are enough if they tell that it is 0."""
+        drawn = self.first.drawn(steps)
+        return self.first.share(steps, drawn) and self.explained(steps), bool((drawn != self.first.right).any())
 
     def share(self, steps: Steps, drawn: Array) -> float:
         """`explained`, for pixels that are drawn already."""
