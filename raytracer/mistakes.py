@@ -339,7 +339,7 @@ MISTAKES = {
     "−b − √disc / 2a: only the root is divided": _quadratic(
         "(−b − √disc) / 2a, in brackets", (False, True), t=lambda a, b, root: b + root / (2 * a)
     ),
-    "−b − √disc / 2 * a: only the root, and times a": _quadratic(
+    "−b − √disc / 2 * a: only the root is divided, then times a": _quadratic(
         "(−b − √disc) / (2 * a), in brackets", t=lambda a, b, root: b + root / 2 * a
     ),
     "−h − √disc / a: only the root is divided, h = D·(O − C)": _quadratic(
