@@ -241,7 +241,8 @@ def _position(P: Array, light: Array) -> Array:
 
 def _by_square(P: Array, light: Array) -> Array:
     L = light - P
-    return L / dot(L, L)[:, None]
+    shortened: Array = L / dot(L, L)[:, None]
+    return shortened
 
 
 def _faded(diffuse: Array, light: Array, cosine: Array) -> Array:
