@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import argparse
 import random
+import re
 import sys
 import tempfile
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
+from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +34,7 @@ from sketch.overlay import Layout, Status, compose  # noqa: E402
 SCENES = sorted((PROJECT / "scenes").glob("*.cli"))
 SIZE = 330
 MOST_GROWTH = 0.05
+SAVES = 15
 BURST = 40  # keys that are pressed without a look at the picture
 NAMES = {"-": "minus"}  # as xdotool calls keys
 
@@ -100,6 +103,35 @@ def _soaked(sketch: Sketch, changes: int, seed: int) -> Outcome:
     )
 
 
+def saves(display: str, folder: Path, count: int) -> dict[str, list[float]]:
+    """Seconds from saving a scene, and from saving a plugged stage, to the picture of it."""
+    scene, stage = folder / "scene.cli", folder / "stage.py"
+    scene.write_text(SCENES[3].read_text())
+    stage.write_text(resources.files("raytracer").joinpath("templates", "stage.py").read_text("utf-8"))
+    waits = {}
+    for file, plug in ((scene, []), (stage, ["--plug", stage])):
+        sketch = Sketch(display, folder, scene, "--size", SIZE, *plug)
+        try:
+            waits[file.name] = [_saved(sketch.find_window(), scene, file, k) for k in range(count)]
+        finally:
+            sketch.process.kill()
+            sketch.process.wait()
+    return waits
+
+
+def _saved(sketch: Sketch, scene: Path, file: Path, k: int) -> float:
+    """Give the background another colour, in the scene or in the stage."""
+    red, text = (k + 1) % 16, file.read_text()
+    found = r"background \S+ \S+ \S+" if file == scene else r"elsewhere=.*\)"
+    colour = f"background {red / 255} 0 0" if file == scene else f"elsewhere=({red / 255}, 0, 0))"
+    sketch.wait_until(lambda: np.ptp(sketch.picture(SIZE)) > 0, "a picture")
+    time.sleep(1.0)  # as people are slower than that
+    begin = time.perf_counter()
+    file.write_text(re.sub(found, colour, text))
+    sketch.wait_until(lambda: (sketch.picture(SIZE)[:3] == [red, 0, 0]).all(), "the picture of what was saved")
+    return time.perf_counter() - begin
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--changes", type=int, default=10_000, help="of scene or stage, default 10000")
@@ -107,7 +139,9 @@ def main() -> int:
     arguments = parser.parse_args()
     with run_display() as display, tempfile.TemporaryDirectory() as folder:
         outcome = soak(display, Path(folder), arguments.changes, arguments.seed)
-    print(outcome)  # noqa: T201 (a command)
+        print(outcome)  # noqa: T201 (a command)
+        for name, waits in saves(display, Path(folder), SAVES).items():
+            print(f"from saving {name} to its picture {np.median(waits):.3f} s, at most {max(waits):.3f} s")  # noqa: T201
     return int(outcome.status != 0 or outcome.growth > MOST_GROWTH)
 
 
