@@ -2,6 +2,7 @@
 
 import importlib.util
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -115,3 +116,44 @@ def test_atheris_runs():
     command = [sys.executable, FUZZ, "interpreter", "--inputs", "300", "--engine", "atheris"]
     done = subprocess.run(command, capture_output=True, text=True)
     assert (done.returncode, "Done 300 runs" in done.stderr) == (0, True)
+
+
+HASHES = """
+import hashlib, sys
+from pathlib import Path
+from random import Random
+sys.path.append(sys.argv[1])
+import fuzz_renders
+from raytracer import STAGES, backend, interpreter, kernels, make_plan
+from raytracer.render import draw
+
+backend.load()
+scenes = [interpreter(path) for path in sorted(Path(sys.argv[2]).rglob("*.cli"))]
+scenes += [scene for k in range(30) if (scene := fuzz_renders.read(fuzz_renders.scene_of(Random(k)))) is not None]
+print(kernels.TILE_WIDTH, kernels.TILE_HEIGHT)
+for scene in scenes:
+    for stage in STAGES:
+        print(hashlib.sha256(draw(make_plan(scene, stage, 150, 131, path=kernels)).tobytes()).hexdigest())
+"""
+
+
+@pytest.mark.slow
+@both_paths
+@pytest.mark.parametrize("wide", [4, 5])
+def test_other_tiles_draw_the_same_bytes(wide, tmp_path):
+    """Tiles of 16 x 32 and of 32 x 16 pixels in place of 64 x 64: the kernels are compiled anew for them."""
+    root = FUZZ.parent.parent
+    shutil.copytree(root / "raytracer", tmp_path / "raytracer", ignore=shutil.ignore_patterns("__pycache__"))
+    bounds = tmp_path / "raytracer" / "kernels" / "bounds.py"
+    text = bounds.read_text()
+    assert "_WIDE, _HIGH = 6, 6" in text
+    bounds.write_text(text.replace("_WIDE, _HIGH = 6, 6", f"_WIDE, _HIGH = {wide}, {9 - wide}"))
+    here, there = (
+        subprocess.run(
+            [sys.executable, "-c", HASHES, FUZZ.parent, root / "scenes"],
+            cwd=folder, env={**os.environ, "PYTHONPATH": str(folder)}, capture_output=True, text=True, check=True,
+        ).stdout.splitlines()
+        for folder in (root, tmp_path)
+    )  # fmt: skip
+    assert (here[0], there[0]) == ("64 64", f"{1 << wide} {1 << 9 - wide}")
+    assert here[1:] == there[1:]
