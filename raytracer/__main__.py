@@ -80,13 +80,14 @@ def _by_plug(arguments: argparse.Namespace, scene: Scene) -> np.ndarray | None:
 
 def test(arguments: argparse.Namespace) -> int:
     """Put a plugged file to the test, check by check; the exit status is 1 if a scene of the course is wrong."""
-    from raytracer.exam import HARD, STABILITY, Result, summary
+    from raytracer.exam import HARD, Result, summary
+    from raytracer.measure import SCENES
 
-    results: list[Result] = []
-    course = sorted(arguments.scenes.glob("*.cli"))
+    results, folder = list[Result](), arguments.scenes or SCENES
+    course = sorted(folder.glob("*.cli"))
     if not course:
-        raise ValueError(f"{arguments.scenes}: found no scene (.cli), expected a folder of some")
-    hard = sorted((arguments.scenes / HARD).glob("*.cli"))
+        raise ValueError(f"{folder}: found no scene (.cli), expected a folder of some")
+    hard = sorted((folder / HARD).glob("*.cli"))
     with (
         closing(PlugRunner(arguments.plug, arguments.patience, echo)) as runner,
         tqdm(bar_format="{desc}", leave=False, disable=None) as line,
@@ -98,9 +99,7 @@ def test(arguments: argparse.Namespace) -> int:
 
         names = runner.examine([*course, *hard], arguments.size, tell)
     print(f"{arguments.plug}: {', '.join(names)}", *summary(results), sep="\n")
-    return int(
-        any(not r.right for r in results if r.check != STABILITY and r.subject in {path.stem for path in course})
-    )
+    return int(any(not (result.right or result.is_hard) for result in results))
 
 
 def template(arguments: argparse.Namespace) -> int:
@@ -294,16 +293,14 @@ def _file(text: str, suffixes: tuple[str, ...]) -> Path:
     return path
 
 
-def count(text: str) -> int:
-    if not (text.isdecimal() and int(text) >= 1):
-        raise argparse.ArgumentTypeError(f"found {text!r}, expected a whole number, 1 or more")
+def count(text: str, least: int = 1) -> int:
+    if not (text.isdecimal() and int(text) >= least):
+        raise argparse.ArgumentTypeError(f"found {text!r}, expected a whole number, {least} or more")
     return int(text)
 
 
 def whole(text: str) -> int:
-    if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f"found {text!r}, expected a whole number, 0 or more")
-    return int(text)
+    return count(text, least=0)
 
 
 def samples(text: str) -> Samples:
@@ -318,7 +315,6 @@ class Argument(NamedTuple):
     options: dict[str, object]
 
 
-SCENES = Path(__file__).resolve().parent.parent / "scenes"
 TEMPLATES = ("tracer", "picture", "stage", "method")
 _SCENE = Argument(("scene",), {"metavar": "SCENE", "type": Path, "help": "a .cli file"})
 _METHOD = Argument(
@@ -430,7 +426,7 @@ COMMANDS: dict[str, tuple[Callable[[argparse.Namespace], int], tuple[Argument, .
             Argument(("--size",), {"metavar": "N", "type": count, "default": 48, "help": "pixels a side, default 48"}),
             Argument(
                 ("--scenes",),
-                {"metavar": "FOLDER", "type": Path, "default": SCENES, "help": "default: the project's own"},
+                {"metavar": "FOLDER", "type": Path, "help": "default: the project's own"},
             ),
             _PATIENCE,
         ),

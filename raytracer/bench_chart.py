@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterable, Sequence
 from datetime import date
 from importlib.metadata import PackageNotFoundError, version
@@ -14,7 +13,7 @@ import numpy as np
 
 from raytracer import chart
 from raytracer.bench import OURS, Check, Report, Row, Section, named, pixels
-from raytracer.chart import OTHER, STYLE, foot, head, new_figure, save, short
+from raytracer.chart import OTHER, STYLE, foot, head, new_figure, save, short, write_rows
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -42,15 +41,16 @@ def write(folder: Path, report: Report) -> list[Path]:
 
 def machine() -> str:
     """The processor, its cores, the system, the versions of what computes, and the day."""
-    versions = ", ".join(f"{name} {_version(name)}" for name in ("numpy", "numba"))
+    versions = ", ".join(f"{name} {installed(name) or 'not installed'}" for name in ("numpy", "numba"))
     return f"{chart.machine()}, {versions}, {date.today().isoformat()}"
 
 
-def _version(name: str) -> str:
+def installed(name: str) -> str:
+    """The version of a package; nothing if it is not installed as one."""
     try:
         return version(name)
     except PackageNotFoundError:
-        return "not installed"
+        return ""
 
 
 # ------------------------------------------------------------------------------------------------ tables
@@ -88,19 +88,23 @@ def _section_table(section: Section) -> list[str]:
 
 def _cells(row: Row) -> list[str]:
     low, median, high = row.timing.quartiles
-    unit, word = unit_of(median)
     return [
         row.name + (" (extrapolated)" if row.extrapolated else ""),
         f"{row.spheres:,}",
         named(row.size) if row.size else "",
-        f"{figure(median / unit)} {word}",
-        f"{figure(low / unit)} … {figure(high / unit)}",
+        *time_and_quartiles(median, low, high),
         figure(1e9 * median / row.things),
         figure(row.things / median / 1e6),
         duration(row.timing.first),
         f"{len(row.timing.rounds)}",
         "" if isnan(row.ratio) else figure(row.ratio),
     ]
+
+
+def time_and_quartiles(median: float, low: float, high: float) -> tuple[str, str]:
+    """Seconds in the unit that the median reads best in, and the quartiles in that."""
+    unit, _ = unit_of(median)
+    return duration(median), f"{figure(low / unit)} … {figure(high / unit)}"
 
 
 def duration(seconds: float) -> str:
@@ -150,14 +154,11 @@ def write_csv(path: Path, report: Report) -> None:
         "section name spheres width height things median_ms quarter_ms three_quarters_ms first_ms rounds "
         "millions_a_second ratio extrapolated different"
     )
-    with path.open("w", encoding="utf-8", newline="") as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(head.split())
-        for section in report.sections:
-            for row in section.rows:
-                table.writerow([section.name, *_csv_cells(row), ""])
-        for check in report.checks:
-            table.writerow(["check", check.what, check.spheres, *check.size, *[""] * 9, check.different])
+    rows: list[list[object]] = [
+        [section.name, *_csv_cells(row), ""] for section in report.sections for row in section.rows
+    ]
+    rows += (["check", check.what, check.spheres, *check.size, *[""] * 9, check.different] for check in report.checks)
+    write_rows(path, head.split(), rows)
 
 
 def _csv_cells(row: Row) -> list[object]:

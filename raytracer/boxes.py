@@ -102,7 +102,7 @@ def make_lens(raster: Raster) -> Lens:
     rows, magnification = inverse_frame(raster.camera) or ([[1.0, 0.0, 0.0]] * 3, inf)
     exponents = [frexp(max(map(abs, row)))[1] for row in rows]
     nx, ny, nz = ((ldexp(x, -e), ldexp(y, -e), ldexp(z, -e)) for (x, y, z), e in zip(rows, exponents, strict=True))
-    cross_x, cross_y = _cross(nx, nz), _cross(ny, nz)
+    cross_x, cross_y = cross(nx, nz), cross(ny, nz)
     width, height, shift = float(raster.width), float(raster.whole_height), float(SAMPLINGS[raster.sampling])
     first_row, rows_drawn = float(raster.first_row), float(raster.height)
     up_x, up_y = exponents[0] - exponents[2], exponents[1] - exponents[2]
@@ -219,5 +219,6 @@ def _clipped(x: Number, size: float) -> Number:
     return select(low < size, low, size + 0.0 * low)
 
 
-def _cross(a: Row, b: Row) -> Row:
+def cross(a: Three, b: Three) -> Three:
+    """a × b."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]

@@ -634,15 +634,22 @@ def write_table(path: Path, scores: list[Score], frames: list[Frame]) -> Path:
         "ulps_median ulps_999 ulps_worst radii_median radii_999 radii_worst "
         "time_unit time_median time_low time_quarter time_three_quarters time_high rounds"
     )
+    rows: list[list[object]] = []
+    for s in scores:
+        errors = [f"{value:.4g}" for value in (*s.ulps, *s.radii)]
+        rows.append(["family", s.family, *_names(s.racer), s.rays, s.wrong, "", *errors, *_times(s.times, "ns")])
+    for f in frames:
+        wrong = [f.pixels, f.wrong, f.wrong_bytes]
+        rows.append(["picture", f.scene, *_names(f.racer), *wrong, *[""] * 6, *_times(f.times, "ms")])
+    return write_rows(path, head.split(), rows)
+
+
+def write_rows(path: Path, head: Sequence[str], rows: Iterable[Iterable[object]]) -> Path:
+    """A table as CSV."""
     with path.open("w", encoding="utf-8", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
-        table.writerow(head.split())
-        for s in scores:
-            errors = [f"{value:.4g}" for value in (*s.ulps, *s.radii)]
-            table.writerow(["family", s.family, *_names(s.racer), s.rays, s.wrong, "", *errors, *_times(s.times, "ns")])
-        for f in frames:
-            wrong = [f.pixels, f.wrong, f.wrong_bytes]
-            table.writerow(["picture", f.scene, *_names(f.racer), *wrong, *[""] * 6, *_times(f.times, "ms")])
+        table.writerow(head)
+        table.writerows(rows)
     return path
 
 

@@ -5,14 +5,25 @@ The shelf is that of `chart`: "none of N" is no 0, but less than 3 / N with 95 %
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from raytracer.chart import OTHER, STYLE, axes_ticks, foot, head, new_figure, rule_of_three, save, shelf_height, short
+from raytracer.chart import (
+    OTHER,
+    STYLE,
+    axes_ticks,
+    foot,
+    head,
+    new_figure,
+    rule_of_three,
+    save,
+    shelf_height,
+    short,
+    write_rows,
+)
 from raytracer.contacts import Count, false_self_hits, missed_contacts
 from raytracer.offsets import OFFSETS
 
@@ -38,12 +49,9 @@ def chart_contacts(folder: Path, progress: Callable[[str], object] = lambda text
 
 def write_table(path: Path, self_hits: list[Count], missed: list[Count]) -> Path:
     """A row for each way to start a ray and each scale, of either fault."""
-    with path.open("w", encoding="utf-8", newline="") as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(["fault", *Count._fields])
-        for fault, counts in ((SELF_HIT, self_hits), (MISSED, missed)):
-            table.writerows([fault, c.offset, f"{c.scale:g}", c.wrong, c.rays] for c in counts)
-    return path
+    faults = (SELF_HIT, self_hits), (MISSED, missed)
+    rows = ([fault, c.offset, f"{c.scale:g}", c.wrong, c.rays] for fault, counts in faults for c in counts)
+    return write_rows(path, ["fault", *Count._fields], rows)
 
 
 def draw_contacts(folder: Path, self_hits: list[Count], missed: list[Count]) -> list[Path]:

@@ -6,7 +6,6 @@ machine disturbs them all, and a time is the median of its rounds.
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable
 from pathlib import Path
 from statistics import median
@@ -16,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from raytracer import backend
-from raytracer.chart import STYLE, foot, head, new_figure, save
+from raytracer.chart import STYLE, foot, head, new_figure, save, write_rows
 from raytracer.interpreter import interpreter
 from raytracer.measure import SCENES
 from raytracer.plan import make_plan
@@ -56,12 +55,10 @@ def chart_samples(
 
 def write_table(path: Path, points: dict[str, list[Point]]) -> Path:
     """A row for each scene and number of samples: milliseconds of the picture, its error in bytes (RMS)."""
-    with path.open("w", encoding="utf-8", newline="") as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(["scene", "samples", "milliseconds", "error"])
-        for scene, found in points.items():
-            table.writerows([scene, p.samples, f"{1e3 * p.seconds:.4g}", f"{p.error:.4g}"] for p in found)
-    return path
+    rows = (
+        [scene, p.samples, f"{1e3 * p.seconds:.4g}", f"{p.error:.4g}"] for scene, found in points.items() for p in found
+    )
+    return write_rows(path, ["scene", "samples", "milliseconds", "error"], rows)
 
 
 def measure_samples(path: Path, size: int, rounds: int) -> list[Point]:

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from raytracer.arrays import Hits
 from raytracer.camera import Vectors, directions_of, eye_grid
+from raytracer.facets import normals_of
 from raytracer.image import to_bytes
 from raytracer.plan import Plan, make_plan
 from raytracer.render import colours_of, hits_of, open_tracer
@@ -159,7 +160,8 @@ class _Loop:
         if not self._shaded:
             return colours_of(self._plan, block)
         shade = self._functions["shade"]
-        shades = [colour_of(shade, shade(hit)) for hit in self._hits_of(block)]
+        expected = "a colour, three numbers from 0 to 1"
+        shades = [three_numbers(shade, shade(hit), expected) for hit in self._hits_of(block)]
         painted = block.paint(np.array(shades).reshape(-1, 3), elsewhere=self._plan.scene.background)
         return to_bytes(painted)
 
@@ -248,18 +250,13 @@ def normal_of(shape: Shape, point: Vector, ray: Ray) -> Vector:
     if isinstance(shape, Sphere):
         normal = np.subtract(point, shape.centre)
     else:
-        first, second, third = np.array(shape.vertices)
-        normal = np.cross(second - first, third - first)
+        normal = normals_of(np.array([shape.vertices]))[0]
         normal = -normal if normal @ np.array(ray.direction) > 0 else normal
     return vector(normal / hypot(*normal))
 
 
-def colour_of(function: Callable[..., Any], found: object) -> Vector:
-    """What a function has returned, as a colour."""
-    return three_numbers(function, found, "a colour, three numbers from 0 to 1")
-
-
 def three_numbers(function: Callable[..., Any], found: Any, expected: str) -> Vector:
+    """What a function has returned, as a vector or a colour. Raises `WrongResultError`."""
     try:
         x, y, z = found
         return float(x), float(y), float(z)

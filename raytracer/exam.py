@@ -14,23 +14,24 @@ from pathlib import Path
 import numpy as np
 
 from raytracer.arrays import Hits
-from raytracer.compare import differences
+from raytracer.compare import TOLERANCE, differences
 from raytracer.course import Ray, hits_of_rays, hits_one_by_one, three_numbers
 from raytracer.families import FAMILIES, Bundle, bundles
 from raytracer.interpreter import SceneError, interpreter
+from raytracer.methods import CERTIFIED
 from raytracer.mistakes import advice, recognise
 from raytracer.plan import make_plan
 from raytracer.plug import Order, Plug, PlugError, blaming, draw_plugged, method_of
 from raytracer.probe import probe_pixel
 from raytracer.render import eye_hits, render_scene
 from raytracer.scene import Camera, Material, Materials, Scene, Sphere, Spheres
+from raytracer.stages import unit_vectors
 from raytracer.trace import ray_intersect_scene
 from raytracer.verify import true_hits
 
 _RAYS, _SEED = 128, 1  # of each family
 _MOST_CALLS = 1_000_000  # for a picture
 _CLOSE = 1e-6  # how far t may be off, relatively
-_TOLERANCE = 1  # bytes
 _GREY = Materials(np.full((1, 11), 0.5))
 
 
@@ -49,6 +50,11 @@ class Result:
     @property
     def right(self) -> bool:
         return self.wrong == self.on_edge and not self.fault
+
+    @property
+    def is_hard(self) -> bool:
+        """Whether it is of what lies beyond the course."""
+        return self.check == STABILITY or self.subject.startswith(f"{HARD}/")
 
     def __str__(self) -> str:
         if self.fault:
@@ -72,12 +78,11 @@ ABOUT = {
 def examine(plug: Plug, scenes: list[Path], size: int) -> Iterator[Result]:
     """The results of all checks that concern what the file defines."""
     read = [(path, _read(path)) for path in scenes]
+    pictures = [(name_of(path), (path, scene, _affordable(size, scene))) for path, scene in read]
+    families = [(family, (family,)) for family in FAMILIES]
     for check, (names, ask) in _CHECKS.items():
         if plug.functions.keys() & names:
-            subjects = FAMILIES if check == STABILITY else [name_of(path) for path, _ in read]
-            sized = [(path, scene, _affordable(size, scene)) for path, scene in read]
-            given = [(family,) for family in FAMILIES] if check == STABILITY else sized
-            for subject, arguments in zip(subjects, given, strict=True):
+            for subject, arguments in families if check == STABILITY else pictures:
                 try:
                     yield from ask(plug, *arguments)
                 except PlugError as error:
@@ -105,7 +110,8 @@ def _rays(plug: Plug, path: Path, scene: Scene, size: int) -> Iterator[Result]:
         true = np.array(raster.exact_direction(x, y), float)
         with blaming(plug.path, f"asked for pixel {x} {y}"):
             found = np.array(three_numbers(ask, ask(scene.camera, x, y, width, height), "a direction, three numbers"))
-        if not np.allclose(_unit(found), _unit(true), rtol=0, atol=1e-9):
+        one, other = unit_vectors(np.stack([found, true]))
+        if not np.allclose(one, other, rtol=0, atol=1e-9):
             wrong += 1
             story = story or (
                 f"pixel {x} {y} of {width} x {height}: the ray goes along {_listed(true)}",
@@ -116,10 +122,13 @@ def _rays(plug: Plug, path: Path, scene: Scene, size: int) -> Iterator[Result]:
 
 def _hits(plug: Plug, path: Path, scene: Scene, size: int) -> Iterator[Result]:
     """On the tracer's own rays."""
-    plan, true = make_plan(scene, "hit", size, size, method=method_of(plug) or "certified"), eye_hits(scene, size, size)
+    method, true = method_of(plug) or CERTIFIED, eye_hits(scene, size, size)
     functions = {name: f for name, f in plug.functions.items() if name in ("intersect", "intersect_triangle")}
     with blaming(plug.path, f"asked for the hits of {path.stem}"):
-        found = hits_one_by_one(functions, plan) if functions else eye_hits_by(plug, scene, size)
+        if functions:
+            found = hits_one_by_one(functions, make_plan(scene, "hit", size, size, method=method))
+        else:
+            found = eye_hits(scene, size, size, method=method)
     both = (found.index >= 0) & (true.index >= 0)
     same = both & (found.index == true.index)
     with np.errstate(invalid="ignore"):
@@ -139,19 +148,12 @@ def _says_only_whether(plug: Plug) -> bool:
     return False
 
 
-def eye_hits_by(plug: Plug, scene: Scene, size: int) -> Hits:
-    """What the eye's rays hit by the file's method."""
-    method = method_of(plug)
-    assert method is not None
-    return eye_hits(scene, size, size, method=method)
-
-
 def _colours(plug: Plug, path: Path, scene: Scene, size: int) -> Iterator[Result]:
     """On hits that are right."""
     shades = {name: f for name, f in plug.functions.items() if name in ("shade", "stage", "render_scene")}
     found = draw_plugged(replace(plug, functions=shades), Order(scene, plug.stage, size, size))
     expected = render_scene(scene, plug.stage, size, size)
-    mask = differences(found, expected) > _TOLERANCE
+    mask = differences(found, expected) > TOLERANCE
     own_hits = "render_scene" in plug.functions
     result = _result("colour", path, scene, mask, lambda x, y: f"{_listed(found[y, x])}", plug.stage, own_hits)
     causes = recognise(found, scene, plug.stage, expected=expected) if mask.any() else ()
@@ -187,14 +189,14 @@ def _told(hits: Hits, place: int | tuple[int, int]) -> str:
 
 
 def _stability(plug: Plug, family: str) -> Iterator[Result]:
-    asked, wrong = 0, 0
+    asked, wrong, only_whether = 0, 0, _says_only_whether(plug)
     story: tuple[str, ...] = ()
     for bundle in bundles(family, _RAYS, _SEED):
         true = true_hits(bundle)
         with blaming(plug.path, f"asked for rays of the family {family}"):
             found = _found(plug, bundle)
         asked += len(true.index)
-        if _says_only_whether(plug):
+        if only_whether:
             true, found = (Hits(hits.t, np.where(hits.index >= 0, 0, -1)) for hits in (true, found))
         for k in np.flatnonzero(found.index != true.index).tolist():
             wrong += 1
@@ -217,12 +219,6 @@ def _found(plug: Plug, bundle: Bundle) -> Hits:
     return hits_of_rays(plug.functions, scene, bundle.origins, bundle.directions)
 
 
-def _unit(vector: np.ndarray) -> np.ndarray:
-    with np.errstate(all="ignore"):
-        largest = np.abs(vector).max()
-        return np.asarray((vector / largest) / np.linalg.norm(vector / largest))
-
-
 def name_of(path: Path) -> str:
     """A scene's name, with its folder's if that is one within the scenes'."""
     return f"{path.parent.name}/{path.stem}" if path.parent.name == HARD else path.stem
@@ -242,8 +238,8 @@ _CHECKS: dict[str, tuple[set[str], Callable[..., Iterator[Result]]]] = {  # and 
 
 def summary(results: list[Result]) -> Iterator[str]:
     """The results for a person: the verdict on the course's scenes, then check by check, then what is beyond them."""
-    hard = [result for result in results if _is_hard(result)]
-    course = [result for result in results if not _is_hard(result)]
+    hard = [result for result in results if result.is_hard]
+    course = [result for result in results if not result.is_hard]
     scenes = {result.subject for result in course}
     wrong = sorted({result.subject for result in course if not result.right})
     verdict = (
@@ -254,10 +250,6 @@ def summary(results: list[Result]) -> Iterator[str]:
     if hard:
         yield "beyond the course, where usual formulas fail:"
         yield from _lines(hard, "hard scenes")
-
-
-def _is_hard(result: Result) -> bool:
-    return result.check == STABILITY or result.subject.startswith(f"{HARD}/")
 
 
 def _lines(results: list[Result], scenes: str) -> Iterator[str]:

@@ -21,10 +21,12 @@ import numpy as np
 
 from raytracer import exact
 from raytracer.arrays import Facets, Grid, Nearest, Rays, TwofoldRays
-from raytracer.certified import FACET_ERROR, K_ERROR, LARGEST, SMALLEST, STEEP, Three, inner
+from raytracer.boxes import cross
+from raytracer.certified import FACET_ERROR, K_ERROR, LARGEST, SMALLEST, STEEP, Three
+from raytracer.methods import inner, minus, scaled
 from raytracer.plain import update
 from raytracer.scene import vector
-from raytracer.twofold import Number, Twofold, add, divide, dot, exponent, multiply, scale, select, two_sum
+from raytracer.twofold import Number, Twofold, add, divide, dot, exponent, multiply, select, two_sum
 
 _NEXT = [1, 2, 0]
 
@@ -48,8 +50,8 @@ class Measures(NamedTuple):
 def measure(origin: Three, corners: ThreeVectors) -> Measures:
     """Plain arithmetic (see `twofold`), as all down to `zero_sides`."""
     a, b, c = corners
-    ab, bc, ca = _from(a, b), _from(b, c), _from(c, a)
-    a, b, c = _from(origin, a), _from(origin, b), _from(origin, c)
+    ab, bc, ca = minus(b, a), minus(c, b), minus(a, c)
+    a, b, c = minus(a, origin), minus(b, origin), minus(c, origin)
     x, y, z = _size(a), _size(b), _size(c)
     second, third = y < x, z < select(y < x, y, x)
     nearest = (
@@ -63,7 +65,7 @@ def measure(origin: Three, corners: ThreeVectors) -> Measures:
 
 def volume_of(of: Measures) -> tuple[Number, Number, Number]:
     """V, whether all lengths are of a usual size, and whether V's sign is certain too."""
-    volume, usual = dot_of(of.normal, of.nearest), _usual(of.sizes) & _usual(of.lengths)
+    volume, usual = inner(of.normal, of.nearest), _usual(of.sizes) & _usual(of.lengths)
     return volume, usual, usual & (abs(volume) > STEEP * (of.lengths[0] * of.lengths[1] * of.size))
 
 
@@ -71,16 +73,16 @@ def plane_of(corners: ThreeVectors, nearest: Three, volume: Number) -> Four:
     """A row of `Facets.planes`."""
     sign, (x, y, z) = -sign_of(volume), unit_normal(corners)
     x, y, z = sign * x, sign * y, sign * z
-    return x, y, z, dot_of((x, y, z), nearest)
+    return x, y, z, inner((x, y, z), nearest)
 
 
 def unit_normal(corners: ThreeVectors) -> Three:
     """The normal of length 1 of a triangle however large or small."""
     a, b, c = corners
     down = -exponent(_larger(_larger(_largest(a), _largest(b)), _largest(c))) - 1
-    a, b, c = _scaled(a, down), _scaled(b, down), _scaled(c, down)
-    ab, bc = _from(a, b), _from(b, c)
-    normal = cross(_scaled(ab, -exponent(_largest(ab))), _scaled(bc, -exponent(_largest(bc))))
+    a, b, c = scaled(a, down), scaled(b, down), scaled(c, down)
+    ab, bc = minus(b, a), minus(c, b)
+    normal = cross(scaled(ab, -exponent(_largest(ab))), scaled(bc, -exponent(_largest(bc))))
     size = _size(normal)
     return normal[0] / size, normal[1] / size, normal[2] / size
 
@@ -116,31 +118,13 @@ def _if_all_vanish(x: Number, y: Number, z: Number, axis: Three, number: float) 
     return select((x | (axis[0] == 0.0)) & (y | (axis[1] == 0.0)) & (z | (axis[2] == 0.0)), number, 0.0)
 
 
-def cross(a: Three, b: Three) -> Three:
-    """a × b."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-def dot_of(a: Three, b: Three) -> Number:
-    """a · b."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
 def sign_of(x: Number) -> Number:
     """−1, 0 or 1."""
     return select(x > 0.0, 1.0, select(x < 0.0, -1.0, 0.0))
 
 
-def _from(a: Three, b: Three) -> Three:
-    return b[0] - a[0], b[1] - a[1], b[2] - a[2]
-
-
 def _size(a: Three) -> Number:
-    return np.sqrt(dot_of(a, a))
-
-
-def _scaled(a: Three, n: Number) -> Three:
-    return scale(a[0], n), scale(a[1], n), scale(a[2], n)
+    return np.sqrt(inner(a, a))
 
 
 def _largest(a: Three) -> Number:
@@ -163,7 +147,8 @@ def see_facets(grid: Grid, kappa: float, origin: np.ndarray, corners: np.ndarray
     over_reach = np.where(usual & (kappa > 0.0), 1.0 / grid.reach, 0.0)
     normal, distance = slope_of(of, volume, over_reach)
     vectors = [side_of_edge(of, i, volume, over_reach) for i in range(3)] + [normal]
-    parts = [inner(*vector, *axis) for vector in vectors for axis in (grid.u, grid.v, np.negative(grid.back))]
+    axes = grid.u, grid.v, tuple(np.negative(grid.back))
+    parts = [inner(vector, axis) for vector in vectors for axis in axes]
     rows = np.where(over_reach > 0.0, parts, 0.0).T
     planes = np.column_stack(plane_of(vectors_of(corners), of.nearest, volume))
     return Facets(rows, np.where(over_reach > 0.0, distance, 0.0), planes, volume != 0.0)

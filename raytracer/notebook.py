@@ -36,10 +36,10 @@ class Picture(np.ndarray):
     def _repr_png_(self) -> bytes | None:
         if not _is_picture(self):
             return None
-        from PIL import Image  # slow to load, and not needed to draw
+        from raytracer.image import encode_png
 
         file = BytesIO()
-        Image.fromarray(np.asarray(self)).save(file, "PNG")
+        encode_png(file, np.asarray(self))
         return file.getvalue()
 
 

@@ -1,6 +1,6 @@
 """A file of one's own, plugged in: its functions stand in for the tracer's own parts.
 
-`PARTS` says which functions a file may define, and what they are given and return. Running one is running the user's
+`PARTS` says which functions a file may define, and what they are given. Running one is running the user's
 own code: see `raytracer.plug_process`, which does that where it can be given up.
 """
 
@@ -15,10 +15,11 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
+from functools import cache
 from inspect import Parameter, signature
 from pathlib import Path
 from types import FunctionType, ModuleType, TracebackType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -41,21 +42,14 @@ class PlugError(FileError):
     """What is wrong with a plugged file, or went wrong in it: `path:line:column: message`."""
 
 
-class Part(NamedTuple):
-    """One row of PARTS."""
-
-    takes: tuple[str, ...]
-    returns: str
-
-
-PARTS = {
-    "render_scene": Part(("scene", "width", "height"), "the picture: rows of pixels of three numbers, 0 to 1"),
-    "eye_ray": Part(("camera", "x", "y", "width", "height"), "the direction of a pixel's ray: three numbers"),
-    "intersect": Part(("ray", "sphere"), "t of the hit, None for a miss"),
-    "intersect_triangle": Part(("ray", "triangle"), "t of the hit, None for a miss"),
-    "shade": Part(("hit",), "the colour of a hit: three numbers, 0 to 1"),
-    "method": Part(("origin", "direction", "centre", "r"), "t of the hits, +inf for a miss: an array"),
-    "stage": Part(("block",), "the colours of a block of pixels: an array, 0 to 1"),
+PARTS = {  # the functions that a file may define, and what they are given
+    "render_scene": ("scene", "width", "height"),
+    "eye_ray": ("camera", "x", "y", "width", "height"),
+    "intersect": ("ray", "sphere"),
+    "intersect_triangle": ("ray", "triangle"),
+    "shade": ("hit",),
+    "method": ("origin", "direction", "centre", "r"),
+    "stage": ("block",),
 }
 
 
@@ -132,16 +126,21 @@ def _listed(names: list[str]) -> str:
 
 def _check_takes(path: Path, name: str, function: Callable[..., Any]) -> None:
     """PlugError where a function cannot be called as it will be."""
-    wanted = PARTS[name].takes
+    wanted = PARTS[name]
     try:
         signature(function).bind(*wanted)
     except TypeError:
         given = ", ".join(key for key, p in signature(function).parameters.items() if p.kind != Parameter.KEYWORD_ONLY)
-        line = getattr(getattr(function, "__code__", None), "co_firstlineno", None)
         message = f"found {name}({given}), expected {name}({', '.join(wanted)})"
-        raise PlugError(path, line, None, message) from None
+        raise PlugError(path, _line_of(function), None, message) from None
     except ValueError:  # something built in, of which nothing is known
         pass
+
+
+def _line_of(function: Callable[..., Any]) -> int | None:
+    """Where a function begins, if it is one of Python's."""
+    line: int | None = getattr(getattr(function, "__code__", None), "co_firstlineno", None)
+    return line
 
 
 def stage_said_by(path: Path) -> str | None:
@@ -237,8 +236,7 @@ def blaming(path: Path, when: str) -> Iterator[None]:
     except PlugError:
         raise
     except WrongResultError as error:
-        line = getattr(getattr(error.function, "__code__", None), "co_firstlineno", None)
-        raise PlugError(path, line, None, str(error)) from error
+        raise PlugError(path, _line_of(error.function), None, str(error)) from error
     except SyntaxError as error:
         where = Path(error.filename) if error.filename else path
         line, column = (number if number and number > 0 else None for number in (error.lineno, error.offset))
@@ -269,10 +267,12 @@ def _last_place(trace: TracebackType | None, folder: Path) -> tuple[Path, int | 
 
 def is_own(filename: str, folder: Path) -> bool:
     """Whether a file is the user's own: in this folder, and not Python's, a package's or the tracer's."""
-    path = Path(filename).resolve()
-    others = [Path(__file__).parent, *(Path(sysconfig.get_path(name)) for name in ("stdlib", "platstdlib", "purelib"))]
-    return (
-        not filename.startswith("<")
-        and folder in path.parents
-        and not any(other.resolve() in path.parents for other in others)
-    )
+    around = Path(filename).resolve().parents
+    return not filename.startswith("<") and folder in around and not any(other in around for other in _others())
+
+
+@cache
+def _others() -> list[Path]:
+    """Folders of files that are not the user's own."""
+    places = [Path(sysconfig.get_path(name)) for name in ("stdlib", "platstdlib", "purelib")]
+    return [place.resolve() for place in (Path(__file__).parent, *places)]

@@ -119,17 +119,17 @@ def share_bands(tracer: Eye | Screen, plan: Plan, watch: Watch, work: Callable[[
 
     Work returns the rows of the picture that it has finished.
     """
-    share_pieces(tracer.bands(plan.shading), watch, 1, lambda rows, piece, worker: work(rows, worker))
+    share_pieces(tracer.bands(plan.shading), watch, 1, work)
 
 
-def share_pieces(bands: list[slice], watch: Watch, pieces: int, work: Callable[[slice, int, int], slice]) -> None:
-    """The same for any bands, in so many pieces each: work(rows, piece, worker)."""
+def share_pieces(bands: list[slice], watch: Watch, pieces: int, work: Callable[[slice, int], slice]) -> None:
+    """The same for any bands, so many times each: those who are at work on one share what there is to do."""
     left = {rows.start: pieces for rows in bands}
 
-    def one(job: tuple[slice, int], worker: int) -> tuple[int, slice]:
+    def one(rows: slice, worker: int) -> tuple[int, slice]:
         if watch.cancelled is not None and watch.cancelled():
             raise Cancelled
-        return job[0].start, work(*job, worker)
+        return rows.start, work(rows, worker)
 
     def tell(done: tuple[int, slice]) -> None:
         band, rows = done
@@ -139,7 +139,7 @@ def share_pieces(bands: list[slice], watch: Watch, pieces: int, work: Callable[[
             if watch.progress is not None:
                 watch.progress(watch.done, watch.rounds * len(bands), rows)
 
-    share([(rows, piece) for rows in bands for piece in range(pieces)], one, watch.threads, tell)
+    share([rows for rows in bands for _ in range(pieces)], one, watch.threads, tell)
 
 
 def _paint(plan: Plan, screen: Screen, picture: np.ndarray, watch: Watch) -> None:
@@ -148,7 +148,7 @@ def _paint(plan: Plan, screen: Screen, picture: np.ndarray, watch: Watch) -> Non
     bands = screen.bands(plan.shading, joint=True)
     tiles = {rows.start: screen.tiles_of(rows) for rows in bands}
 
-    def paint(rows: slice, piece: int, worker: int) -> slice:
+    def paint(rows: slice, worker: int) -> slice:
         easel.paint(tiles[rows.start], worker)
         return rows
 
@@ -254,7 +254,7 @@ def block_of(plan: Plan, tracer: Eye | Screen, rows: slice, worker: int = 0, who
 def whole_of(plan: Plan, tracer: Eye | Screen, watch: Watch | None = None) -> Whole | None:
     """What a stage wants to know of the whole picture before it draws the first pixel."""
     if plan.stage.needs_tests:
-        return Whole(None, count_tests(tracer.boxes, plan.raster))
+        return Whole(None, count_tests(plan.eye.boxes, plan.raster))
     return Whole(hits_of(plan, tracer, watch), reach=plan.reach) if plan.stage.needs_whole else None
 
 

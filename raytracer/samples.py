@@ -94,7 +94,7 @@ def _draw_means(fine: Plan, side: int, wanted: np.ndarray, picture: np.ndarray, 
     with open_tracer(fine, watch.threads) as tracer:
         easel = make_easel(fine, tracer, picture) if fine.painter and isinstance(tracer, Screen) else None
 
-        def one(rows: slice, piece: int, worker: int) -> slice:
+        def one(rows: slice, worker: int) -> slice:
             if wanted[rows].any():
                 _draw_strip(fine, tracer, easel, rows, side, wanted[rows], picture[rows], worker)
             return rows

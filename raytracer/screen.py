@@ -128,13 +128,6 @@ class Screen(NamedTuple):
     workspace: Workspace
     desks: list[Desk]  # one a thread
 
-    @property
-    def boxes(self) -> np.ndarray:
-        """The box of each sphere, then of each triangle: int32 (shapes, 4)."""
-        boxes = self.bins.boxes.reshape(-1, 4).copy()
-        boxes[self.slow.ids] = self.slow.boxes
-        return np.concatenate([boxes[: self.spheres], boxes[len(self.targets.balls) :]])
-
     def bands(self, shading: float = 0.0, joint: bool = False) -> list[slice]:
         """The picture's rows, cut between tiles into pieces that take a moment.
 

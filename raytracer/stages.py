@@ -162,7 +162,7 @@ class Block:
 
     def to_light(self, light: Light) -> np.ndarray:
         """Unit vectors from the hit points to a light: (hits, 3); zero where the light is at the point itself."""
-        return _unit(np.subtract(light.position, self.scene.camera.eye) - self.from_eye)
+        return unit_vectors(np.subtract(light.position, self.scene.camera.eye) - self.from_eye)
 
     def cosine(self, light: Light) -> np.ndarray:
         """max(0, N·L) of a light: (hits,)."""
@@ -423,7 +423,7 @@ def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return dot
 
 
-def _unit(vectors: np.ndarray) -> np.ndarray:
+def unit_vectors(vectors: np.ndarray) -> np.ndarray:
     """Vectors (n, 3) brought to length 1, however long they are; the zero vector stays."""
     largest = np.abs(vectors).max(axis=1, initial=0.0)
     scaled = vectors / np.where(largest > 0, largest, 1.0)[:, None]

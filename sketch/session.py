@@ -15,6 +15,7 @@ import numpy as np
 from raytracer import STAGES, SceneError, interpreter, probe_pixel, render_scene
 from raytracer.camera import make_raster
 from raytracer.compare import DIFFERENCES_LEGEND
+from raytracer.course import BLANK
 from raytracer.methods import CERTIFIED
 from raytracer.plug_process import PATIENCE, PlugRunner, echo
 from sketch import controls
@@ -36,7 +37,7 @@ from sketch.overlay import (
 from sketch.pace import FrameRate
 from sketch.rays import Ink, ink_of, lines_of
 from sketch.watch import Watcher
-from sketch.worker import BLANK, Drawing, Renderer, Request
+from sketch.worker import Drawing, Renderer, Request
 
 _PATIENCE = 5.0  # seconds that the end waits for a picture to be saved
 

@@ -17,6 +17,7 @@ import numpy as np
 
 from raytracer import Cancelled, Plan, Scene, backend, interpreter, make_plan
 from raytracer.compare import TOLERANCE, Comparison, compare, difference_picture, differences
+from raytracer.course import BLANK
 from raytracer.faults import FileError
 from raytracer.methods import CERTIFIED
 from raytracer.mistakes import recognise
@@ -30,7 +31,6 @@ from raytracer.stages import wrong_pixels
 from sketch.orbit import HOME, Orbit, seen_from
 from sketch.pace import COARSENESS, Pace, enlarged
 
-BLANK = 40  # the grey of pixels that nothing was drawn on yet
 REST = 0.12  # seconds without a movement until the camera is at rest
 _MANY = 1000  # shapes that numpy does not look through once more
 _PATIENCE = 1 / 30  # seconds: between two looks at a picture that grows; for a frame, when the next one is wanted

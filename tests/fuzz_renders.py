@@ -126,6 +126,19 @@ def read(text: str) -> Scene | None:
         return None
 
 
+def drawn_alike(random: Random) -> bool:
+    """Make a scene and draw it in every way; False if it is none. What goes wrong is told with the scene's text."""
+    text = scene_of(random)
+    scene = read(text)
+    if scene is None:
+        return False
+    try:
+        check(scene, random)
+    except Exception as error:
+        raise AssertionError(f"{type(error).__name__}: {error}\n{text}") from error
+    return True
+
+
 def check(scene: Scene, random: Random) -> None:
     """AssertionError if any way of drawing differs from the others, or a number that is none comes into a colour."""
     kernels = backend.load()

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from datetime import datetime
-from importlib.metadata import PackageNotFoundError, version
 from math import isnan, log10
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, NamedTuple
 
 from raytracer import backend, chart
-from raytracer.bench_chart import duration, figure, unit_of
+from raytracer.bench_chart import duration, figure, installed, time_and_quartiles
 from raytracer.image import save
 from raytracer.measure import COMPILED, STRESS
 from raytracer.methods import METHODS
@@ -237,14 +236,11 @@ def _section_table(section: str, rows: list[Timing]) -> Table:
 
 
 def _timing_cells(row: Timing) -> list[str]:
-    unit, word = unit_of(row.median_ms / 1e3)
-    low, high = (figure(ms / 1e3 / unit) for ms in (row.quarter_ms, row.three_quarters_ms))
     return [
         row.name + (" (extrapolated)" if row.extrapolated == "1" else ""),
         f"{row.spheres:,}",
         _size(row),
-        f"{figure(row.median_ms / 1e3 / unit)} {word}",
-        f"{low} … {high}",
+        *time_and_quartiles(row.median_ms / 1e3, row.quarter_ms / 1e3, row.three_quarters_ms / 1e3),
         figure(row.millions_a_second),
         duration(row.first_ms / 1e3),
         "" if isnan(row.ratio) else figure(row.ratio),
@@ -268,16 +264,8 @@ def machine() -> list[tuple[str, str]]:
         ("Machine", chart.machine()),
         ("Memory", memory),
         ("Compiler", f"none: {fault}" if fault else "numba"),
-        *((name, found) for name in _VERSIONS if (found := _version(name))),
+        *((name, found) for name in _VERSIONS if (found := installed(name))),
     ]
-
-
-def _version(name: str) -> str:
-    """Nothing if it is not installed as a package."""
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return ""
 
 
 def duration_in_words(seconds: float) -> str:
