@@ -23,7 +23,7 @@ from raytracer.mistakes import advice, recognise
 from raytracer.plan import make_plan
 from raytracer.plug import Order, Plug, PlugError, blaming, draw_plugged, method_of
 from raytracer.probe import probe_pixel
-from raytracer.render import eye_hits, render_scene
+from raytracer.render import eye_hits, render_scene, undecided
 from raytracer.scene import Camera, Material, Materials, Scene, Sphere, Spheres
 from raytracer.stages import unit_vectors
 from raytracer.trace import ray_intersect_scene
@@ -174,7 +174,7 @@ def _result(
     height, width = mask.shape
     clear = mask
     if hits and mask.any():
-        clear = mask & ~make_plan(scene, stage, width, height).eye.doubtful(slice(0, height))
+        clear = mask & ~undecided(scene, width, height)
     story: tuple[str, ...] = ()
     if mask.any():
         y, x = np.argwhere(clear if clear.any() else mask)[0].tolist()

@@ -19,7 +19,7 @@ from raytracer.camera import focal_length
 from raytracer.compare import TOLERANCE, differences
 from raytracer.guide import LOOKS, Array, Guide, Place, Steps, ball_normal, dot, facet_normal, to_screen, unit
 from raytracer.image import to_bytes
-from raytracer.render import render_scene
+from raytracer.render import render_scene, undecided
 from raytracer.scene import Camera, Colour, Light, Scene
 from raytracer.stages import BLACK, Stage
 
@@ -489,9 +489,9 @@ def recognise(
     """The mistakes that explain what is wrong with a picture of a scene, names in `MISTAKES`, the best one first.
 
     Several are named where each would draw this picture, many of the quadratic as `A_QUADRATIC`; two that were made
-    together are one name, with "and" between them. Nothing if the picture is right, none is known, or the stage is not
-    one that the guide's tracer draws (`LOOKS` in `raytracer.guide`). `expected` is the right picture, if it is there
-    already; `cancelled()` is asked now and then.
+    together are one name, with "and" between them. Nothing if the picture is right, or wrong only where float64 cannot
+    tell what is hit; nor if no mistake is known, or the stage is not one that the guide's tracer draws (`LOOKS` in
+    `raytracer.guide`). `expected` is the right picture, if it is there already; `cancelled()` is asked now and then.
     Raises ValueError for what is no picture, uint8 (height, width, 3).
     """
     end = perf_counter() + _SECONDS
@@ -501,7 +501,7 @@ def recognise(
     height, width = picture.shape[:2]
     right = render_scene(scene, stage, width, height, sampling=sampling) if expected is None else expected
     off = differences(picture, right)
-    if not off.any():
+    if not off.any() or not off[~undecided(scene, width, height, sampling)].any():  # or rounding alone is to blame
         return ()
     allowed = bool(np.count_nonzero(off > TOLERANCE) < _FEWEST)
     tolerance = 0 if allowed else TOLERANCE

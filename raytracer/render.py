@@ -297,6 +297,14 @@ def eye_hits(
         return hits_of(plan, tracer, Watch(threads), polished=True)
 
 
+def undecided(scene: Scene, width: int, height: int, sampling: str = "corner") -> np.ndarray:
+    """Which pixels' eye rays float64 cannot tell a hit or a shape of, such as tangent ones: bool (height, width).
+
+    There a tracer may be right and draw another picture than ours, which is exact. ValueError as for `eye_hits`.
+    """
+    return make_plan(scene, "hit", width, height, sampling).eye.doubtful(slice(0, height))
+
+
 def warm_up(scene: Scene, stage: str, method: str = CERTIFIED) -> bool:
     """Have the kernels ready that a picture needs, machine code and all; False if there is no compiler.
 

@@ -15,16 +15,16 @@ from pathlib import Path
 
 import numpy as np
 
-from raytracer import Cancelled, Plan, Scene, backend, interpreter, make_plan
+from raytracer import Cancelled, Scene, backend, interpreter, make_plan
 from raytracer.compare import TOLERANCE, Comparison, compare, difference_picture, differences
 from raytracer.course import BLANK
 from raytracer.faults import FileError
 from raytracer.methods import CERTIFIED
-from raytracer.mistakes import recognise
+from raytracer.mistakes import MOST_SHAPES, recognise
 from raytracer.orbit import pivot_of
 from raytracer.plug import Order
 from raytracer.plug_process import PlugRunner
-from raytracer.render import draw, warm_up
+from raytracer.render import draw, undecided, warm_up
 from raytracer.samples import Samples, draw_samples
 from raytracer.scene import Vector
 from raytracer.stages import wrong_pixels
@@ -32,7 +32,6 @@ from sketch.orbit import HOME, Orbit, seen_from
 from sketch.pace import COARSENESS, Pace, enlarged
 
 REST = 0.12  # seconds without a movement until the camera is at rest
-_MANY = 1000  # shapes that numpy does not look through once more
 _PATIENCE = 1 / 30  # seconds: between two looks at a picture that grows; for a frame, when the next one is wanted
 
 
@@ -233,7 +232,7 @@ class Renderer:
             expected = draw_samples(plan, samples, cancelled=self._superseded)
             found = drawing.picture
             difference, comparison = difference_picture(found, expected), compare(found, expected)
-            on_edge = _undecided(plan, found, expected) if comparison.wrong else 0
+            on_edge = _on_edge(drawing.scene, found, expected) if comparison.wrong else 0
             reference = Reference(expected, difference, comparison, on_edge)
             self.drawing = self.whole = drawing = replace(drawing, reference=reference)
             self._changed()
@@ -315,12 +314,12 @@ class Renderer:
         return np.full((size, size, 3), BLANK, np.uint8)
 
 
-def _undecided(plan: Plan, found: np.ndarray, expected: np.ndarray) -> int:
+def _on_edge(scene: Scene, found: np.ndarray, expected: np.ndarray) -> int:
     """How many pixels are wrong where float64 cannot decide what their rays hit."""
-    if len(plan.scene) > _MANY:
+    if len(scene) > MOST_SHAPES:
         return 0
-    doubtful = plan.eye.doubtful(slice(0, plan.raster.height))
-    return int((doubtful & (differences(found, expected) > TOLERANCE)).sum())
+    height, width, _ = found.shape
+    return int((undecided(scene, width, height) & (differences(found, expected) > TOLERANCE)).sum())
 
 
 def bring_in_kernels(seen: Drawing) -> bool:

@@ -226,6 +226,15 @@ def test_what_explains_nearly_as_much_is_not_named():
     assert recognise(np.flipud(render_scene(scene)).copy(), scene) == ("upside down",)
 
 
+@pytest.mark.parametrize("stage", ["hit", "diffuse"])
+def test_what_rounding_decides_is_no_mistake(stage):
+    """The textbook's formula misses tangent rays of this scene; c with r in place of r² draws just that, as r is 1."""
+    scene = interpreter(SCENES / "04_many_spheres.cli")
+    picture = render_scene(scene, stage, 160, 160, method="textbook")
+    assert np.count_nonzero(differences(picture, render_scene(scene, stage, 160, 160))) > 6
+    assert recognise(picture, scene, stage) == ()
+
+
 @pytest.mark.parametrize("stage", ["diffuse", "full"])
 def test_other_pictures_show_no_mistake(stage, monkeypatch):
     """Noise, another scene, another stage, half of the picture missing."""
