@@ -218,6 +218,7 @@ class View(NamedTuple):
     balls: np.ndarray  # float64, flat: x, y, z, radius of each sphere, then `Facets.planes`
     material: np.ndarray  # int32: of each of those rows, a row of `Paints.colours`
     facets: np.ndarray  # float64, flat: FACET numbers a triangle, see `screen`
+    corners: np.ndarray  # float64, flat: see `full.corners_of`
     first_facet: int  # the number of the first triangle
 
 
@@ -281,6 +282,23 @@ class Paints(NamedTuple):
     colours: np.ndarray  # float64, flat: red, green, blue, 0 of each material
 
 
+class Cells(NamedTuple):
+    """The cells of some screens, each with the list of the shapes that it may show: see `kernels.cells`."""
+
+    starts: np.ndarray  # int64: where the list of each cell begins, of all screens, row by row
+    entries: np.ndarray  # int32, flat: the lists, of shapes and their boxes within the cell
+    columns: int  # cells side by side
+    per_screen: int  # cells
+
+
+class Mirrors(NamedTuple):
+    """What plane mirrors show: see `mirrors`."""
+
+    of: np.ndarray  # int32: the number of the plane of each row of `View.balls`, −1 for none; empty without planes
+    cells: Cells  # the picture's screen, once for each plane
+    shift: int  # a cell is 2**shift pixels wide and high
+
+
 class FullPaints(NamedTuple):
     """What the stage `full` is painted with."""
 
@@ -288,11 +306,9 @@ class FullPaints(NamedTuple):
     behind: tuple[float, float, float]  # the background's colour
     lights: np.ndarray  # float64 (n, 6): the place as seen from the eye, the colour
     surfaces: np.ndarray  # float64, flat: see `full.surfaces_of`
-    corners: np.ndarray  # float64, flat: see `full.corners_of`
-    starts: np.ndarray  # int64, flat: for each light where the lists of its cells begin, see `lookup`
-    ids: np.ndarray  # int32: the lists
-    resolution: int  # cells along an edge
+    cells: Cells  # the six faces of the cube about each light: see `lookup`
     tree: Tree  # over all shapes
+    glass: Mirrors  # where to look for what plane mirrors show
     bits: int  # see `full.Terms`
     specular: bool
     shadows: bool

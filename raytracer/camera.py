@@ -271,6 +271,7 @@ def seen_at(raster: Raster, offsets: np.ndarray) -> np.ndarray | None:
     return np.stack([x / 2, y / 2 - raster.first_row * ahead, ahead], axis=1)
 
 
+@lru_cache(maxsize=8)
 def spread(raster: Raster) -> float:
     """κ: no ray of the picture has a reach of more than κ times its length; +inf where that is not known.
 

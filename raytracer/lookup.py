@@ -12,24 +12,22 @@ from types import ModuleType
 
 import numpy as np
 
-from raytracer import plain
-from raytracer.arrays import Tree
-from raytracer.boxes import Lens, facet_boxes, make_lens
+from raytracer.arrays import Cells, Tree
+from raytracer.boxes import Lens, make_lens
 from raytracer.camera import make_raster
 from raytracer.scene import Camera, Spheres, Triangles, Vector, vector
-
-Cells = tuple[np.ndarray, np.ndarray]  # where each cell's list begins, int64; and the numbers of shapes, int32
 
 _MOST = 512  # cells along an edge of the cube
 _KEPT = 8  # scenes' cubes, and trees
 _LARGE = 8.0  # times the size that half of the shapes do not exceed
 _WIDER = 2.0**-46  # of a box, and of its distance from the origin
-_NO_STARTS, _NO_IDS = np.empty(0, np.int64), np.empty(0, np.int32)
+_SHIFT = 7  # a cell is 2**_SHIFT pixels wide and high
+_NO_PLANE = (0.0, 0.0, 0.0, 0.0)
 
 
 def resolution_for(shapes: int) -> int:
-    """How many cells an edge of the cube has."""
-    return min(_MOST, 1 << max(0, int(np.ceil(np.log2(2.0 * np.sqrt(max(shapes, 1)))))))
+    """How many cells an edge of the cube has: the power of two from 2 √shapes on."""
+    return min(_MOST, 1 << ((max(4 * shapes, 4) - 1).bit_length() + 1) // 2)
 
 
 @lru_cache(maxsize=_KEPT)
@@ -38,11 +36,12 @@ def light_cells(
 ) -> Cells:
     """The lists of the cubes of all lights, given by their places, one cube behind the other."""
     balls, corners = _in_units(spheres, triangles, unit)
-    cubes = [_light_cells(balls[: len(spheres)], corners, np.ldexp(light, -unit), path) for light in lights]
-    ends = np.cumsum([0, *(len(ids) for _, ids in cubes)])
-    starts = [starts + end for (starts, _), end in zip(cubes, ends[:-1], strict=True)]
-    ids = np.concatenate([*(ids for _, ids in cubes), _NO_IDS])
-    return np.concatenate([*starts, _NO_STARTS]), _numbers(ids, spheres)
+    size = resolution_for(len(spheres) + len(triangles))
+    cubes = [_light_cells(balls, corners, np.ldexp(light, -unit), size, path) for light in lights]
+    ends = np.cumsum([0, *(len(entries) // 2 for _, entries in cubes)])
+    starts = [starts[:-1] + end for (starts, _), end in zip(cubes, ends[:-1], strict=True)]
+    entries = np.concatenate([*(entries for _, entries in cubes), np.empty(0, np.int32)])
+    return Cells(np.concatenate([*starts, ends[-1:]]), entries, size, size * size)
 
 
 @lru_cache(maxsize=_KEPT)
@@ -77,38 +76,25 @@ def _order(along: np.ndarray, sizes: np.ndarray) -> np.ndarray:
     return np.concatenate([order[~large], empty, order[large]])
 
 
-def _light_cells(balls: np.ndarray, corners: np.ndarray, light: np.ndarray, path: ModuleType) -> Cells:
-    size = resolution_for(len(balls) + len(corners))
-    faces = [_face_boxes(balls, corners, light, size, axis, sign) for axis in range(3) for sign in (1.0, -1.0)]
-    starts, ids = path.sort_into_cells(np.stack(faces), size)
-    return starts, ids
+def _light_cells(
+    balls: np.ndarray, corners: np.ndarray, light: np.ndarray, size: int, path: ModuleType
+) -> tuple[np.ndarray, np.ndarray]:
+    """The cells of a cube's six faces: a pixel may be seen through all of its area, not from its corner alone."""
+    boxes = np.empty((6, len(balls) + len(corners), 4), np.int32)
+    for lens, face in zip(_lenses(size), boxes, strict=True):
+        path.bound_images(lens, vector(light), _NO_PLANE, balls.reshape(-1), corners, face.reshape(-1))
+    starts, entries = path.sort_into_cells(boxes, size, size, _SHIFT, 1)
+    return starts, entries
 
 
-def _face_boxes(
-    balls: np.ndarray, corners: np.ndarray, light: np.ndarray, size: int, axis: int, sign: float
-) -> np.ndarray:
-    """The boxes of cells of all shapes on one face: int32 (shapes, 4)."""
-    u, v, w = (np.zeros(3) for _ in range(3))
-    u[(axis + 1) % 3], v[(axis + 2) % 3], w[axis] = 1.0, -1.0, -sign
-    camera = Camera((0.0, 0.0, 0.0), vector(u), vector(v), vector(w), 90.0)
-    lens = make_lens(make_raster(camera, size, size))
-    spheres = _widened(plain.bound(lens, light, balls)[0], size)
-    return np.concatenate([spheres, _triangles(lens, light, corners, size)]) if len(corners) else spheres
-
-
-def _triangles(lens: Lens, light: np.ndarray, corners: np.ndarray, size: int) -> np.ndarray:
-    """What both a triangle's corners and a sphere about it allow."""
-    middle = corners.mean(axis=1)
-    reach = np.sqrt(((corners - middle[:, None]) ** 2).sum(axis=2).max(axis=1)) * (1.0 + 1e-9)
-    about = _widened(plain.bound(lens, light, np.column_stack([middle, reach]))[0], size)
-    own = _widened(facet_boxes(lens, corners - light), size)
-    low, high = np.maximum(about, own), np.minimum(about, own)
-    return np.stack([low[:, 0], high[:, 1], low[:, 2], high[:, 3]], axis=-1)
-
-
-def _widened(boxes: np.ndarray, size: int) -> np.ndarray:
-    """From pixels whose corner sees a shape to those of which any part may. Empty boxes between two corners as well."""
-    left, right, top, bottom = boxes.T
-    hidden = (right == 0) & (left == 0) & (top == 0) & (bottom == 0)
-    wide = np.stack([np.maximum(left - 1, 0), right, np.maximum(top - 1, 0), bottom], axis=-1)
-    return np.where(hidden[:, None], 0, wide).astype(np.int32)
+@lru_cache(maxsize=16)
+def _lenses(size: int) -> list[Lens]:
+    """The faces of a cube of so many cells an edge: those of x, −x, y, −y, z, −z."""
+    lenses = []
+    for axis in range(3):
+        for sign in (1.0, -1.0):
+            u, v, w = (np.zeros(3) for _ in range(3))
+            u[(axis + 1) % 3], v[(axis + 2) % 3], w[axis] = 1.0, -1.0, -sign
+            camera = Camera((0.0, 0.0, 0.0), vector(u), vector(v), vector(w), 90.0)
+            lenses.append(make_lens(make_raster(camera, size, size).finer(1 << _SHIFT)))
+    return lenses

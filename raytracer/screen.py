@@ -24,14 +24,17 @@ from numpy.lib.stride_tricks import as_strided
 
 from raytracer import plain
 from raytracer.arrays import (
+    CORNERS,
     FACET,
     Bins,
     Candidates,
     Canvas,
     FineRays,
     FullPaints,
+    Grid,
     HitRows,
     Hits,
+    Mirrors,
     Paints,
     Scratch,
     Seen,
@@ -45,8 +48,9 @@ from raytracer.boxes import Lens, make_lens
 from raytracer.camera import Raster, eye_grid, fine_columns, fine_rows
 from raytracer.eye import bundle_of, usable_spread
 from raytracer.facets import exact_volume
-from raytracer.full import corners_of, surfaces_of, terms_of
-from raytracer.lookup import light_cells, resolution_for, tree_of
+from raytracer.full import surfaces_of, terms_of
+from raytracer.lookup import light_cells, tree_of
+from raytracer.mirrors import NO_MIRRORS, see_mirrors
 from raytracer.plan import Plan
 from raytracer.pool import cores, share
 from raytracer.scene import Colour, Materials, Scene, Triangles
@@ -311,19 +315,23 @@ def make_paints(plan: Plan, screen: Screen) -> Paints:
 
 def make_full_paints(plan: Plan, screen: Screen) -> FullPaints:
     """What the stage `full` is painted with."""
-    scene, paints = plan.scene, make_paints(plan, screen)
-    terms, shapes, corners = (
-        terms_of(scene, bool(plan.lights)),
-        (scene.spheres, scene.triangles),
-        screen.targets.corners,
-    )
+    scene, paints, shapes = plan.scene, make_paints(plan, screen), (plan.scene.spheres, plan.scene.triangles)
+    terms = terms_of(scene, bool(plan.lights))
     lights = tuple(light.position for light in plan.lights) if terms.shadows else ()
+    glass = _glass(scene, screen) if terms.mirrors else NO_MIRRORS
     return FullPaints(
         paints.background, scene.background, paints.lights, surfaces_of(scene.materials).reshape(-1),
-        corners_of(screen.origin, corners).reshape(-1), *light_cells(*shapes, screen.unit, lights, screen.kernels),
-        resolution_for(len(scene)), tree_of(*shapes, screen.unit, screen.kernels),
+        light_cells(*shapes, screen.unit, lights, screen.kernels),
+        tree_of(*shapes, screen.unit, screen.kernels), glass,
         terms.bits, terms.specular, terms.shadows, terms.mirrors,
     )  # fmt: skip
+
+
+def _glass(scene: Scene, screen: Screen) -> Mirrors:
+    balls, corners = screen.targets.balls, screen.targets.corners
+    return see_mirrors(
+        make_lens(screen.raster), screen.view.eye, balls, corners, scene.triangles, screen.unit, screen.kernels
+    )
 
 
 _NO_PAINTS = Paints(np.zeros(3), np.zeros(3), np.empty((0, 6)), Materials().diffuse.reshape(-1))
@@ -368,13 +376,20 @@ def _desk(workspace: Workspace, kernels: ModuleType, worker: int) -> Desk:
 
 
 def _view(raster: Raster, origin: np.ndarray, balls: np.ndarray, material: np.ndarray) -> View:
-    grid, (x, y, z) = eye_grid(raster), origin.tolist()
-    across = np.concatenate([grid.across, np.full(8, grid.across[-1])])
-    up, a1, a0 = (np.append(rows, rows[-1]) for rows in (grid.up, grid.a1, grid.a0))
+    x, y, z = origin.tolist()
     return View(
-        across, up, a1, a0, grid.a2, grid.u, grid.v, grid.back, grid.reach, usable_spread(raster), (x, y, z),
-        balls.reshape(-1), material, _NO_SPHERES, len(balls),
+        *_rays(raster), usable_spread(raster), (x, y, z), balls.reshape(-1), material, _NO_SPHERES, _NO_SPHERES,
+        len(balls),
     )  # fmt: skip
+
+
+@lru_cache(maxsize=8)
+def _rays(raster: Raster) -> Grid:
+    """With eight columns and one row to spare."""
+    grid = eye_grid(raster)
+    across = np.concatenate([grid.across, np.full(SPARE, grid.across[-1])])
+    up, a1, a0 = (np.append(rows, rows[-1]) for rows in (grid.up, grid.a1, grid.a0))
+    return grid._replace(across=across, up=up, a1=a1, a0=a0)
 
 
 def _with_facets(
@@ -385,18 +400,19 @@ def _with_facets(
     count, back = len(corners), view.back
     table = workspace.array(len(view.balls) + 4 * count, np.float64, "table")
     facets = workspace.array(FACET * count, np.float64, "facets")
+    away = workspace.array(CORNERS * count, np.float64, "corners")
     boxes = workspace.array(4 * count, np.int32, "facet boxes")
     table[: len(view.balls)] = view.balls
     frame, volumes = (view.u, view.v, (-back[0], -back[1], -back[2]), raster.camera.w), np.full(count, np.nan)
     while kernels.see_facets(
         lens, frame, view.reach, view.kappa, view.eye, corners, triangles.corner_numbers, volumes, facets,
-        table[len(view.balls) :], boxes,
+        table[len(view.balls) :], away, boxes,
     ):  # fmt: skip
         for i in np.flatnonzero(np.isnan(volumes)):
             volumes[i] = exact_volume(origin, corners[i])
     table = table.view()
     table.flags.writeable = False  # to the kernels, arrays that can be written to are others
-    return view._replace(balls=table, facets=facets), boxes.reshape(-1, 4)
+    return view._replace(balls=table, facets=facets, corners=away), boxes.reshape(-1, 4)
 
 
 def _sort(

@@ -5,8 +5,9 @@ from raytracer.kernels.compiler import cache_named_after_sources
 with cache_named_after_sources():
     from raytracer.kernels.bounds import TILE_HEIGHT, TILE_WIDTH, begin, bound, count, fill
     from raytracer.kernels.bvh import along_curve, build, candidates_in_tree, enclose, nearest_in_tree
+    from raytracer.kernels.cells import bound_images, sort_into_cells
     from raytracer.kernels.facets import see_facets
-    from raytracer.kernels.full import radiance_of, sort_into_cells
+    from raytracer.kernels.full import radiance_of
     from raytracer.kernels.reading import read_plain
     from raytracer.kernels.tiles import (
         find_fine_hits,
@@ -30,6 +31,7 @@ __all__ = [
     "along_curve",
     "begin",
     "bound",
+    "bound_images",
     "build",
     "candidates",
     "candidates_in_tree",

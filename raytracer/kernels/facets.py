@@ -4,12 +4,13 @@ corners   three times x y z each   float64 (n, 3, 3)
   ↓ `facets`, `boxes.facet_box`
 table     12 of `Facets.rows`, `distance`, 3 of `zero_side`, the numbers of the corners; FACET each, flat
 planes    see `Facets.planes`, flat
+away      the corners as seen from the eye and their largest distance, see `full.corners_of`; CORNERS each, flat
 boxes     as those of spheres, int32, flat
 """
 
 import numpy as np
 
-from raytracer.arrays import FACET
+from raytracer.arrays import CORNERS, FACET
 from raytracer.boxes import facet_box
 from raytracer.certified import inner
 from raytracer.facets import measure, plane_of, side_of_edge, slope_of, volume_of, zero_side
@@ -17,8 +18,8 @@ from raytracer.kernels.compiler import borrowing, inlined
 
 
 @borrowing
-def see_facets(lens, frame, reach, kappa, eye, corners, numbers, volumes, table, planes, boxes):
-    """Fill table, planes and boxes; frame is u, v, −back and w, and `volumes` is V, or NaN.
+def see_facets(lens, frame, reach, kappa, eye, corners, numbers, volumes, table, planes, away, boxes):
+    """Fill table, planes, away and boxes; frame is u, v, −back and w, and `volumes` is V, or NaN.
 
     Returns how many V are not certain in float64. They are put into `volumes` as NaN, the others as they are.
     """
@@ -31,6 +32,7 @@ def see_facets(lens, frame, reach, kappa, eye, corners, numbers, volumes, table,
             volume = volumes[i]
             unsure += np.isnan(volume)
         volumes[i] = volume
+        _put_corners(away, np.uint64(CORNERS) * i, eye, triangle)
         at, known = np.uint64(FACET) * i, usual and kappa > 0.0
         normal, distance = slope_of(of, volume, 1.0 / reach)
         table[at + np.uint64(12)] = distance if known else 0.0
@@ -53,6 +55,16 @@ def see_facets(lens, frame, reach, kappa, eye, corners, numbers, volumes, table,
 @inlined
 def _corner(corners, i, corner):
     return corners[i, corner, 0], corners[i, corner, 1], corners[i, corner, 2]
+
+
+@inlined
+def _put_corners(away, at, eye, triangle):
+    farthest = 0.0
+    for corner in triangle:
+        x, y, z = corner[0] - eye[0], corner[1] - eye[1], corner[2] - eye[2]
+        away[at], away[at + np.uint64(1)], away[at + np.uint64(2)] = x, y, z
+        farthest, at = max(farthest, abs(x) + abs(y) + abs(z)), at + np.uint64(3)
+    away[at] = farthest
 
 
 @inlined

@@ -25,7 +25,8 @@ from raytracer.bounce import (
     within_edges,
 )
 from raytracer.certified import inner
-from raytracer.kernels.compiler import borrowing, compiled, inlined
+from raytracer.kernels.cells import spot_of
+from raytracer.kernels.compiler import borrowing, inlined
 from raytracer.kernels.lanes import (
     WIDTH,
     all_of,
@@ -36,7 +37,9 @@ from raytracer.kernels.lanes import (
     first_where,
     gather,
     gather_rows,
+    in_box,
     is_hit,
+    lane_numbers,
     load,
     raised,
     same,
@@ -49,13 +52,17 @@ from raytracer.shading import cosine, highlight, land_on_any, raised_to_whole, t
 from raytracer.twofold import select
 
 _LONGER = 1.0 + 2.0**-40
+CELL = 128.0  # pixels of a face of a light's cube that a cell is wide and high
 
 
 @inlined
-def radiance(view, paints, t, d, where, scratch):
-    """The colours that come along eight eye rays D from hits at t on the shapes at these places."""
+def radiance(view, paints, t, d, where, hit, x, row, scratch):
+    """The colours that come along eight eye rays D from hits at t on the shapes at these places.
+
+    They are those of a row from column x on; if not, row is −1.
+    """
     p, n, radius = land_on_any(t, d, view.eye, gather_rows(view.balls, where), at_least(where, view.first_facet))
-    red, green, blue, weight = spread(0.0), spread(0.0), spread(0.0), spread(1.0)
+    red, green, blue, weight = spread(0.0), spread(0.0), spread(0.0), select(hit, spread(1.0), 0.0)
     background = paints.behind
     for bounce in range(MOST_REFLECTIONS + 1):
         material, shown = spread(np.int32(3)) * gather(view.material, where), weight > 0.0
@@ -68,7 +75,8 @@ def radiance(view, paints, t, d, where, scratch):
         if bounce == MOST_REFLECTIONS or not paints.mirrors or not any_of(weight > 0.0):
             break
         d, facing = reflected(d, n, radius)
-        t, found = _nearest(view, paints, p, d, where, facing < 0.0, weight > 0.0, scratch)
+        plane = _plane_of(paints.glass, where, weight > 0.0) if bounce == 0 and row >= 0 else -1
+        t, found = _nearest(view, paints, p, d, where, facing < 0.0, weight > 0.0, plane, x, row, scratch)
         missed = (weight > 0.0) & ~is_hit(found)
         red = red + select(missed, weight * background[0], 0.0)
         green = green + select(missed, weight * background[1], 0.0)
@@ -114,16 +122,18 @@ def _light(view, paints, p, n, radius, d, where, shown, material):
 def _blocked(view, paints, i, p, light, a, where, size, asked):
     """Whether something stands between P and light i, where that is asked."""
     d = light[0] - p[0], light[1] - p[1], light[2] - p[2]
-    cell, blocked, left = _cell(paints.resolution, d), ~asked, asked
-    first = np.int64(i) * np.int64(6 * paints.resolution * paints.resolution + 1)
+    cells, blocked, left = paints.cells, ~asked, asked
+    (cell, spot), first = _cell(cells.columns, d), np.int64(i) * np.int64(6 * cells.per_screen)
     while any_of(left):
         chosen = first_where(left, cell)
         group = left & equal_to(cell, chosen)
-        start, stop = paints.starts[first + chosen], paints.starts[first + chosen + 1]
+        start, stop = cells.starts[first + chosen], cells.starts[first + chosen + 1]
         for place in range(start, stop):
             if not any_of(group & ~blocked):
                 break
-            j = paints.ids[place]
+            if not any_of(group & in_box(spot, cells.entries[2 * place + 1])):
+                continue
+            j = cells.entries[2 * place]
             own = equal_to(where, np.int64(j))
             if not all_of(own | ~group):
                 blocked = blocked | (group & _blocks(view, paints, j, p, d, a, 1.0 / a, own, size))
@@ -136,18 +146,20 @@ def _blocked(view, paints, i, p, light, a, where, size, asked):
 
 @inlined
 def _cell(resolution, d):
-    """The cell of the light's cube that D comes from: 6 faces of rows of cells."""
+    """The cell of the light's cube that D comes from: 6 faces of rows of cells; and where in the cell, as a spot."""
     x, y, z = -d[0], -d[1], -d[2]
     ax, ay, az = abs(x), abs(y), abs(z)
     of_x, of_y = (ax >= ay) & (ax >= az), ay >= az
     along = select(of_x, x, select(of_y, y, z))
     across, down = select(of_x, y, select(of_y, z, x)), select(of_x, z, select(of_y, x, y))
     face = select(of_x, 0.0, select(of_y, 1.0, 2.0)) * 2.0 + select(along < 0.0, 1.0, 0.0)
-    half, last = resolution * 0.5, resolution - 1.0
+    half, last = resolution * (0.5 * CELL), resolution * CELL - 1.0
     over = half / abs(along)
-    column, row = np.floor(across * over + half), np.floor(down * over + half)
-    column, row = select(column < last, column, last), select(row < last, row, last)
-    return whole((face * resolution + row) * resolution + column)
+    x, y = np.floor(across * over + half), np.floor(down * over + half)
+    x, y = select(x < last, x, last), select(y < last, y, last)
+    column, row = np.floor(x * (1.0 / CELL)), np.floor(y * (1.0 / CELL))
+    spot = spot_of(whole(x - column * CELL), whole(y - row * CELL))
+    return whole((face * resolution + row) * resolution + column), spot
 
 
 @inlined
@@ -156,7 +168,7 @@ def _blocks(view, paints, j, p, d, a, over_a, own, size):
     row = _row(view.balls, np.uint64(4) * np.uint64(j))
     if j < view.first_facet:
         return blocks_sphere(away_from(row, p, view.eye), d, a, over_a, row[3], size, own)
-    corners, at = paints.corners, np.uint64(CORNERS) * np.uint64(j - view.first_facet)
+    corners, at = view.corners, np.uint64(CORNERS) * np.uint64(j - view.first_facet)
     over, under = plane_ahead(p, d, row, corners[at + np.uint64(9)], size, own)
     between = (over > 0.0) & (over < under)
     if any_of(between):
@@ -173,34 +185,63 @@ def _within(corners, at, p, d):
 
 
 @inlined
-def _nearest(view, paints, p, d, where, from_outside, asked, scratch):
-    """What rays from P on the shapes at these places hit first."""
+def _plane_of(glass, where, asked):
+    """The number of the plane in which all asked rays are thrown back; −1 if there is none."""
+    if len(glass.of) == 0:
+        return -1
+    planes = gather(glass.of, where)
+    plane = first_where(asked, planes)
+    return plane if all_of(equal_to(planes, plane) | ~asked) else -1
+
+
+@inlined
+def _nearest(view, paints, p, d, where, from_outside, asked, plane, x, row, scratch):
+    """What rays from P on the shapes at these places hit first.
+
+    A plane's number says that they are eye rays of a row from column x on, thrown back there.
+    """
     a, index, size = inner(d[0], d[1], d[2], d[0], d[1], d[2]), spread(np.int32(-1)), size_of(p)
     over_a, best = 1.0 / a, select(asked, spread(np.inf), -np.inf)
     tree, stack, near, top, over_d = paints.tree, scratch.stack, scratch.near, 1, d
-    stack[0], near[0] = 0, 0.0
-    if len(tree.ids) > WIDTH:
+    stack[0], near[0], ids, start, stop, step = 0, 0.0, tree.ids, 0, WIDTH, 1
+    spot = where
+    if plane >= 0:
+        spot, start, stop = _list_of(paints.glass, plane, x, row)
+        ids, step = paints.glass.cells.entries, 2
+    elif len(tree.ids) > WIDTH:
         over_d = 1.0 / d[0], 1.0 / d[1], 1.0 / d[2]
         top = _push(tree, view.eye, p, over_d, best, tree.depth - 1, 0, stack, near, 0)
     while top > 0:
         top -= 1
         if not any_of(near[top] <= best):
             continue
-        level, node = stack[top] & 31, stack[top] >> 5
-        if level > 0:
-            top = _push(tree, view.eye, p, over_d, best, level - 1, node * WIDTH, stack, near, top)
-            continue
-        for place in range(node * WIDTH, (node + 1) * WIDTH):
-            j = tree.ids[place]
+        if plane < 0:
+            level, node = stack[top] & 31, stack[top] >> 5
+            start, stop = node * WIDTH, (node + 1) * WIDTH
+            if level > 0:
+                top = _push(tree, view.eye, p, over_d, best, level - 1, start, stack, near, top)
+                continue
+        for place in range(start, stop, step):
+            j = ids[place]
             if j < 0:
                 break
             own = equal_to(where, np.int64(j))
-            if all_of((own & (from_outside | (j >= view.first_facet))) | ~asked):
+            may_hit = asked & ~(own & (from_outside | (j >= view.first_facet)))
+            if not any_of(may_hit & in_box(spot, ids[place + 1]) if plane >= 0 else may_hit):
                 continue
             t = _meet(view, paints, j, p, d, a, over_a, own, size, from_outside)
             closer = (t < best) | ((t == best) & at_least(index, j))  # of equally near ones that with the least number
             index, best = select(closer, spread(j), index), select(closer, t, best)
     return best, index
+
+
+@inlined
+def _list_of(glass, plane, x, row):
+    """Eight pixels of a row as a spot in their cell; and where the list of what a plane shows there begins and ends."""
+    (shift, cells), last = (glass.shift, glass.cells), (1 << glass.shift) - 1
+    cell = plane * cells.per_screen + (row >> shift) * cells.columns + (x >> shift)
+    spot = spot_of(spread(np.int32(x & last)) + lane_numbers(), spread(np.int32(row & last)))
+    return spot, 2 * cells.starts[cell], 2 * cells.starts[cell + 1]
 
 
 @inlined
@@ -239,7 +280,7 @@ def _meet(view, paints, j, p, d, a, over_a, own, size, from_outside):
         if any_of(hit):
             t = select(hit, sphere_hit_at(h, c, disc, over_a), np.inf)
         return t
-    corners, at = paints.corners, np.uint64(CORNERS) * np.uint64(j - view.first_facet)
+    corners, at = view.corners, np.uint64(CORNERS) * np.uint64(j - view.first_facet)
     over, under = plane_ahead(p, d, row, corners[at + np.uint64(9)], size, own)
     ahead, t = over > 0.0, spread(np.inf)
     if any_of(ahead):
@@ -263,36 +304,10 @@ def _row(table, row):
     return table[row], table[row + np.uint64(1)], table[row + np.uint64(2)], table[row + np.uint64(3)]
 
 
-@compiled
-def sort_into_cells(boxes, resolution):
-    """The lists of a cube's cells, from the boxes of cells of all shapes on each face: int32 (6, shapes, 4).
-
-    Returns where each list begins, int64 (cells + 1,), and the numbers of shapes, int32.
-    """
-    faces, shapes, _ = boxes.shape
-    starts = np.zeros(faces * resolution * resolution + 1, np.int64)
-    for face in range(faces):
-        for i in range(shapes):
-            for row in range(boxes[face, i, 2], boxes[face, i, 3]):
-                for column in range(boxes[face, i, 0], boxes[face, i, 1]):
-                    starts[(face * resolution + row) * resolution + column + 1] += 1
-    for cell in range(1, len(starts)):
-        starts[cell] += starts[cell - 1]
-    ids, places = np.empty(starts[-1], np.int32), starts.copy()
-    for face in range(faces):
-        for i in range(shapes):
-            for row in range(boxes[face, i, 2], boxes[face, i, 3]):
-                for column in range(boxes[face, i, 0], boxes[face, i, 1]):
-                    cell = (face * resolution + row) * resolution + column
-                    ids[places[cell]] = i
-                    places[cell] += 1
-    return starts, ids
-
-
 @borrowing
 def radiance_of(view, paints, t, index, columns, rows, scratch, colours):
     """The colours of single hits, float64 (n, 3): t, index and pixels are arrays of whole eights."""
-    u, v, back = view.u, view.v, view.back
+    u, v, back, everywhere = view.u, view.v, view.back, spread(0.0) == 0.0
     for k in range(np.uint64(0), np.uint64(len(t)), np.uint64(WIDTH)):
         across, up = gather(view.across, load(columns, k)), gather(view.up, load(rows, k))
         d = (
@@ -300,7 +315,7 @@ def radiance_of(view, paints, t, index, columns, rows, scratch, colours):
             across * u[1] + (up * v[1] - back[1]),
             across * u[2] + (up * v[2] - back[2]),
         )
-        red, green, blue = radiance(view, paints, load(t, k), d, load(index, k), scratch)
+        red, green, blue = radiance(view, paints, load(t, k), d, load(index, k), everywhere, 0, -1, scratch)
         store(scratch.batch, 0, red)
         store(scratch.batch, WIDTH, green)
         store(scratch.batch, 2 * WIDTH, blue)

@@ -249,6 +249,25 @@ def equal_to(typing, places, number):
 
 
 @intrinsic
+def in_box(typing, spots, box):
+    """Where a spot lies in an entry's box: see `kernels.cells`."""
+
+    def lower(context, builder, sig, args):
+        highest = ir.Constant(args[0].type, [0x80808080 - 2**32] * WIDTH)
+        kept = builder.and_(builder.sub(args[0], _spread(builder, args[1])), highest)
+        return builder.icmp_signed("==", kept, highest)
+
+    return MASK(spots, types.int32), lower
+
+
+@intrinsic
+def lane_numbers(typing):
+    """The places 0 to 7."""
+    numbers = ir.Constant(ir.VectorType(_INT32, WIDTH), list(range(WIDTH)))
+    return PLACES(), lambda context, builder, sig, args: numbers
+
+
+@intrinsic
 def first_where(typing, mask, places):
     """The place in the first lane whose mask is set, if there is any."""
 

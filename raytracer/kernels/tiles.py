@@ -111,12 +111,12 @@ def _shaded_tile(view, scratch, tile, paints, out):
                 put_lanes(out, row, x, tile.right, *background, scratch)
                 continue
             where = select(hit, index, spread(largest_of(index)))
-            red, green, blue = shade(view, paints, line, load(scratch.k, place), x, where, scratch)
+            red, green, blue = shade(view, paints, line, load(scratch.k, place), row, x, where, hit, scratch)
             red, green, blue = _over(background, hit, to_byte(red), to_byte(green), to_byte(blue))
             put_lanes(out, row, x, tile.right, red, green, blue, scratch)
 
 
-def _diffuse(view, paints, line, k, x, where, scratch):
+def _diffuse(view, paints, line, k, row, x, where, hit, scratch):
     """`stages.diffuse`."""
     p, n, radius = surface(view, line, k, x, where)
     red, green, blue, light = spread(0.0), spread(0.0), spread(0.0), paints.lights
@@ -129,17 +129,17 @@ def _diffuse(view, paints, line, k, x, where, scratch):
 
 
 @inlined
-def _normal(view, paints, line, k, x, where, scratch):
+def _normal(view, paints, line, k, row, x, where, hit, scratch):
     """`stages.normal`."""
     _, n, radius = _surface_of_any(view, line, k, x, where)
     return (n[0] / radius + 1.0) / 2.0, (n[1] / radius + 1.0) / 2.0, (n[2] / radius + 1.0) / 2.0
 
 
 @inlined
-def _full(view, paints, line, k, x, where, scratch):
+def _full(view, paints, line, k, row, x, where, hit, scratch):
     """`stages.full`."""
     t, direction = _ray(view, line, k, x)
-    return radiance(view, paints, t, direction, where, scratch)
+    return radiance(view, paints, t, direction, where, hit, x, row, scratch)
 
 
 @inlined
