@@ -36,10 +36,17 @@ def land_on_any(t: Number, d: Three, eye: Three, row: Four, flat: Number) -> tup
     """
     x, y, z, w = row
     p, n = land(t, d, (eye[0] - x, eye[1] - y, eye[2] - z), w)
-    along = w / (x * d[0] + y * d[1] + z * d[2])
-    p = select(flat, along * d[0], p[0]), select(flat, along * d[1], p[1]), select(flat, along * d[2], p[2])
+    q = land_on_plane(d, row)
+    p = select(flat, q[0], p[0]), select(flat, q[1], p[1]), select(flat, q[2], p[2])
     n = select(flat, x, n[0]), select(flat, y, n[1]), select(flat, z, n[2])
     return p, n, select(flat, 1.0, w)
+
+
+def land_on_plane(d: Three, row: Four) -> Three:
+    """P where a ray meets a triangle's plane."""
+    x, y, z, w = row
+    along = w / (x * d[0] + y * d[1] + z * d[2])
+    return along * d[0], along * d[1], along * d[2]
 
 
 def unit_of(d: Three) -> Three:

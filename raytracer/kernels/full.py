@@ -48,7 +48,7 @@ from raytracer.kernels.lanes import (
     store,
     whole,
 )
-from raytracer.shading import cosine, highlight, land_on_any, raised_to_whole, towards, unit_of
+from raytracer.shading import cosine, highlight, land_on_any, land_on_plane, raised_to_whole, towards, unit_of
 from raytracer.twofold import select
 
 _LONGER = 1.0 + 2.0**-40
@@ -61,7 +61,11 @@ def radiance(view, paints, t, d, where, hit, x, row, scratch):
 
     They are those of a row from column x on; if not, row is −1.
     """
-    p, n, radius = land_on_any(t, d, view.eye, gather_rows(view.balls, where), at_least(where, view.first_facet))
+    row_of, flat = rows_at(view.balls, where), at_least(where, view.first_facet)
+    if all_of(flat):
+        p, n, radius = land_on_plane(d, row_of), (row_of[0], row_of[1], row_of[2]), spread(1.0)
+    else:
+        p, n, radius = land_on_any(t, d, view.eye, row_of, flat)
     red, green, blue, weight = spread(0.0), spread(0.0), spread(0.0), select(hit, spread(1.0), 0.0)
     background = paints.behind
     for bounce in range(MOST_REFLECTIONS + 1):
