@@ -306,7 +306,8 @@ class FullPaints(NamedTuple):
     behind: tuple[float, float, float]  # the background's colour
     lights: np.ndarray  # float64 (n, 6): the place as seen from the eye, the colour
     surfaces: np.ndarray  # float64, flat: see `full.surfaces_of`
-    cells: Cells  # the six faces of the cube about each light: see `lookup`
+    cells: Cells  # the six faces of the cube about each light, and its walls: see `lookup`
+    beyond: np.ndarray  # int32, flat: for each light and row of `View.balls`, not 0 where walls may shade it
     tree: Tree  # over all shapes
     glass: Mirrors  # where to look for what plane mirrors show
     bits: int  # see `full.Terms`

@@ -13,14 +13,20 @@ from types import ModuleType
 import numpy as np
 
 from raytracer.arrays import Cells, Tree
+from raytracer.bounce import LEAVING
 from raytracer.boxes import Lens, make_lens
 from raytracer.camera import make_raster
+from raytracer.facets import unit_normal
 from raytracer.scene import Camera, Spheres, Triangles, Vector, vector
 
 _MOST = 512  # cells along an edge of the cube
 _KEPT = 8  # scenes' cubes, and trees
 _LARGE = 8.0  # times the size that half of the shapes do not exceed
 _WIDER = 2.0**-46  # of a box, and of its distance from the origin
+_ALL_OF_CELL = 0  # as the box of an entry
+_MOST_WALLS, _FEW_OF = 12, 8  # beyond a wall there is no more than one shape of so many
+_ROUNDING = 2.0**-50  # of all lengths that come together in a height above a plane: more than it is off
+_UNSEEN = LEAVING / 4.0  # of a triangle's longest edge: of its farthest corner's distance at least half as much
 _SHIFT = 7  # a cell is 2**_SHIFT pixels wide and high
 _NO_PLANE = (0.0, 0.0, 0.0, 0.0)
 
@@ -33,15 +39,19 @@ def resolution_for(shapes: int) -> int:
 @lru_cache(maxsize=_KEPT)
 def light_cells(
     spheres: Spheres, triangles: Triangles, unit: int, lights: tuple[Vector, ...], path: ModuleType
-) -> Cells:
-    """The lists of the cubes of all lights, given by their places, one cube behind the other."""
+) -> tuple[Cells, np.ndarray]:
+    """The lists of the cubes of all lights, given by their places, one cube behind the other.
+
+    Each cube ends with one cell more: the list of the light's walls (see `_walls`), which are in no other. And which
+    shapes are to be asked for those: int32 (lights · shapes,), not 0 where they are.
+    """
     balls, corners = _in_units(spheres, triangles, unit)
     size = resolution_for(len(spheres) + len(triangles))
     cubes = [_light_cells(balls, corners, np.ldexp(light, -unit), size, path) for light in lights]
-    ends = np.cumsum([0, *(len(entries) // 2 for _, entries in cubes)])
-    starts = [starts[:-1] + end for (starts, _), end in zip(cubes, ends[:-1], strict=True)]
-    entries = np.concatenate([*(entries for _, entries in cubes), np.empty(0, np.int32)])
-    return Cells(np.concatenate([*starts, ends[-1:]]), entries, size, size * size)
+    ends = np.cumsum([0, *(len(entries) // 2 for _, entries, _ in cubes)])
+    starts = [starts[:-1] + end for (starts, _, _), end in zip(cubes, ends[:-1], strict=True)]
+    entries, beyond = (np.concatenate([*(cube[i] for cube in cubes), np.empty(0, np.int32)]) for i in (1, 2))
+    return Cells(np.concatenate([*starts, ends[-1:]]), entries, size, size * size), beyond
 
 
 @lru_cache(maxsize=_KEPT)
@@ -78,13 +88,44 @@ def _order(along: np.ndarray, sizes: np.ndarray) -> np.ndarray:
 
 def _light_cells(
     balls: np.ndarray, corners: np.ndarray, light: np.ndarray, size: int, path: ModuleType
-) -> tuple[np.ndarray, np.ndarray]:
-    """The cells of a cube's six faces: a pixel may be seen through all of its area, not from its corner alone."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The cells of a cube's six faces, and of its walls: starts, entries, and which shapes are beyond those.
+
+    A pixel may be seen through all of its area, not from its corner alone.
+    """
+    walls, beyond = _walls(balls, corners, light)
     boxes = np.empty((6, len(balls) + len(corners), 4), np.int32)
     for lens, face in zip(_lenses(size), boxes, strict=True):
         path.bound_images(lens, vector(light), _NO_PLANE, balls.reshape(-1), corners, face.reshape(-1))
+    boxes[:, walls] = 0
     starts, entries = path.sort_into_cells(boxes, size, size, _SHIFT, 1)
-    return starts, entries
+    last = np.column_stack([walls, np.full(len(walls), _ALL_OF_CELL)]).astype(np.int32)
+    return np.append(starts, starts[-1] + len(walls)), np.append(entries, last), beyond
+
+
+def _walls(balls: np.ndarray, corners: np.ndarray, light: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles that shade nearly nothing: the light and nearly all shapes are on one side of them. Their rows, int64.
+
+    And which shapes are not on that side of all of them, int32 (shapes,). Such are a ground and the walls of a room, so
+    only the largest are looked at. A shape may reach beyond a plane by so little that `bounce.plane_ahead` does not see
+    it.
+    """
+    rows, found = np.concatenate([balls.reshape(-1), corners.reshape(-1)]), []
+    beyond_any = np.zeros(len(balls) + len(corners), bool)
+    edges = np.sqrt(((corners - np.roll(corners, 1, axis=1)) ** 2).sum(axis=2).max(axis=1, initial=0.0))
+    for i in np.argsort(-edges, kind="stable")[:_MOST_WALLS].tolist():
+        first, second, third = map(vector, corners[i])
+        normal = np.array(unit_normal((first, second, third)))
+        middle = normal @ corners[i, 0]
+        height = normal @ light - middle
+        side = np.copysign(1.0, height)
+        heights = side * (balls[:, :3] @ normal - middle) - balls[:, 3], side * (corners @ normal - middle)
+        error = _ROUNDING * (np.abs(light).max() + np.nanmax(np.abs(rows)) + abs(middle))
+        beyond = np.concatenate([heights[0], heights[1].min(axis=1)]) < error - _UNSEEN * edges[i]
+        if abs(height) > error and np.count_nonzero(beyond) <= len(beyond) // _FEW_OF:
+            beyond_any |= beyond
+            found.append(len(balls) + i)
+    return np.array(found, np.int64), beyond_any.astype(np.int32)
 
 
 @lru_cache(maxsize=16)

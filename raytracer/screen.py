@@ -321,7 +321,7 @@ def make_full_paints(plan: Plan, screen: Screen) -> FullPaints:
     glass = _glass(scene, screen) if terms.mirrors else NO_MIRRORS
     return FullPaints(
         paints.background, scene.background, paints.lights, surfaces_of(scene.materials).reshape(-1),
-        light_cells(*shapes, screen.unit, lights, screen.kernels),
+        *light_cells(*shapes, screen.unit, lights, screen.kernels),
         tree_of(*shapes, screen.unit, screen.kernels), glass,
         terms.bits, terms.specular, terms.shadows, terms.mirrors,
     )  # fmt: skip

@@ -12,6 +12,7 @@ from raytracer import backend, exact, eye_hits, interpreter, machine_code, rende
 from raytracer.camera import make_raster
 from raytracer.full import terms_of
 from raytracer.interpreter import interpret
+from raytracer.lookup import light_cells
 from raytracer.plan import make_plan
 from raytracer.render import draw
 from raytracer.scene import Camera
@@ -113,6 +114,46 @@ def test_what_is_kept_of_shapes_is_not_taken_for_another_unit_of_length():
         np.testing.assert_array_equal(
             *(draw(make_plan(seen, "full", 120, 120, path=PATHS[path])) for path in ("numpy", "compiled"))
         )
+
+
+def on_a_ground(rng, below, slant):
+    """Balls and triangles above a ground that may slant, some of them standing on it, one of them below."""
+    up = np.array([slant, 1.0, slant / 2]) / np.linalg.norm([slant, 1.0, slant / 2])
+    right = np.cross(up, [0, 0, 1.0]) / np.linalg.norm(np.cross(up, [0, 0, 1.0]))
+    frame = np.stack([right, up, np.cross(right, up)])
+
+    def words(place):
+        return " ".join(repr(x) for x in (np.array(place) @ frame + [0, -1, 0]).tolist())
+
+    lines = [f"light {words([2, 5, 3])} .6 .6 .6", f"light {words([-4, 0.5, 1])} .4 .4 .4"]
+    lines += ["surface .6 .5 .4 .1 .1 .1 0 0 0 1 .3"]
+    corners = [-3, 0, -3], [3, 0, -3], [3, 0, 3], [-3, 0, 3]
+    for three in (corners[:3], corners[2:] + corners[:1]):
+        lines += ["begin", *(f"vertex {words(corner)}" for corner in three), "end"]
+    for radius, x, z in zip(rng.uniform(0.1, 0.4, 12), *rng.uniform(-2, 2, (2, 12)), strict=True):
+        lines += [f"sphere {float(radius)!r} {words([x, rng.choice([1, 3]) * radius, z])}"]
+    for place in rng.uniform([-2, 0.5, -2], [2, 2, 2], (9, 3)):
+        lines += ["begin", *(f"vertex {words(place + rng.uniform(-0.4, 0.4, 3))}" for _ in range(3)), "end"]
+    for place in ([0.0, -0.5, 3.3], [0.0, -0.2, 0.5])[:below]:  # before the ground, lower than it, and through it
+        lines += [f"sphere 0.3 {words(place)}"]
+    return interpret("eye 0 0 8\n" + "\n".join(lines))
+
+
+@both_paths
+@pytest.mark.parametrize("slant", [0.0, 0.3])
+@pytest.mark.parametrize("below", [0, 1, 2])
+def test_a_ground_that_shades_nearly_nothing_is_asked_for_by_what_is_below_it(below, slant):
+    scene, kernels = on_a_ground(np.random.default_rng(below), below, slant), backend.load()
+    for light in scene.lights:
+        cells, beyond = light_cells(scene.spheres, scene.triangles, 0, (light.position,), kernels)
+        first, last = cells.starts[-2:]
+        ground = len(scene.spheres.balls) + np.arange(2)
+        assert set(ground) <= set(cells.entries[2 * first : 2 * last : 2].tolist())
+        assert not set(ground) & set(cells.entries[: 2 * first : 2].tolist())
+        assert (np.flatnonzero(beyond[: len(scene.spheres)]) >= len(scene.spheres) - below).all()
+        assert np.count_nonzero(beyond[: len(scene.spheres)]) == below
+    pictures = [draw(make_plan(scene, "full", 120, 80, path=PATHS[path])) for path in ("numpy", "compiled")]
+    np.testing.assert_array_equal(*pictures)
 
 
 SURFACE = "surface .5 .5 .5 .1 .1 .1 {shiny} {power} {mirror}\n"

@@ -127,7 +127,9 @@ def _blocked(view, paints, i, p, light, a, where, size, asked):
     """Whether something stands between P and light i, where that is asked."""
     d = light[0] - p[0], light[1] - p[1], light[2] - p[2]
     cells, blocked, left = paints.cells, ~asked, asked
-    (cell, spot), first = _cell(cells.columns, d), np.int64(i) * np.int64(6 * cells.per_screen)
+    (cell, spot), per_light = _cell(cells.columns, d), 6 * cells.per_screen + 1
+    first = np.int64(i) * np.int64(per_light)
+    beyond = _beyond_walls(view, paints, i, first + per_light - 1, where, asked)
     while any_of(left):
         chosen = first_where(left, cell)
         group = left & equal_to(cell, chosen)
@@ -145,7 +147,18 @@ def _blocked(view, paints, i, p, light, a, where, size, asked):
                 o = away_from(_row(view.balls, np.uint64(4) * np.uint64(j)), p, view.eye)
                 blocked = blocked | (group & blocks_own(o, d, a))
         left = left & ~group
+        if not any_of(left):
+            left, beyond, cell = beyond & ~blocked, beyond & ~beyond, spread(np.int32(per_light - 1))
     return blocked & asked
+
+
+@inlined
+def _beyond_walls(view, paints, i, cell, where, asked):
+    """Which of the asked rays light i's walls may block: those from shapes that are not all on its side of them."""
+    if paints.cells.starts[cell] == paints.cells.starts[cell + 1]:
+        return asked & ~asked
+    shapes = len(paints.beyond) // len(paints.lights)
+    return asked & at_least(gather(paints.beyond, where + spread(np.int32(i * shapes))), 1)
 
 
 @inlined
