@@ -69,7 +69,7 @@ def radiance(view, paints, t, d, where, hit, x, row, scratch):
     red, green, blue, weight = spread(0.0), spread(0.0), spread(0.0), select(hit, spread(1.0), 0.0)
     background = paints.behind
     for bounce in range(MOST_REFLECTIONS + 1):
-        material, shown = spread(np.int32(3)) * gather(view.material, where), weight > 0.0
+        material, shown = spread(np.int32(3)) * numbers_at(view.material, where), weight > 0.0
         ambient = rows_at(paints.surfaces, material + spread(np.int32(1)))
         light = _light(view, paints, p, n, radius, d, where, shown, material)
         red = red + select(shown, weight * (ambient[0] + light[0]), 0.0)
@@ -158,7 +158,7 @@ def _beyond_walls(view, paints, i, cell, where, asked):
     if paints.cells.starts[cell] == paints.cells.starts[cell + 1]:
         return asked & ~asked
     shapes = len(paints.beyond) // len(paints.lights)
-    return asked & at_least(gather(paints.beyond, where + spread(np.int32(i * shapes))), 1)
+    return asked & at_least(numbers_at(paints.beyond, where + spread(np.int32(i * shapes))), 1)
 
 
 @inlined
@@ -206,7 +206,7 @@ def _plane_of(glass, where, asked):
     """The number of the plane in which all asked rays are thrown back; −1 if there is none."""
     if len(glass.of) == 0:
         return -1
-    planes = gather(glass.of, where)
+    planes = numbers_at(glass.of, where)
     plane = first_where(asked, planes)
     return plane if all_of(equal_to(planes, plane) | ~asked) else -1
 
@@ -314,6 +314,14 @@ def rows_at(table, places):
         x, y, z, w = _row(table, np.uint64(4) * np.uint64(first_of(places)))
         return spread(x), spread(y), spread(z), spread(w)
     return gather_rows(table, places)
+
+
+@inlined
+def numbers_at(array, places):
+    """`gather`, likewise."""
+    if same(places):
+        return spread(array[np.uint64(first_of(places))])
+    return gather(array, places)
 
 
 @inlined
