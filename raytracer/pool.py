@@ -12,7 +12,10 @@ from functools import cache, partial
 from itertools import count
 from queue import SimpleQueue
 from threading import Thread
+from time import sleep
 from typing import TypeVar
+
+_LOOKS = 200  # while the others are nearly done: to be woken takes longer
 
 Job = TypeVar("Job")
 Done = TypeVar("Done")
@@ -44,6 +47,10 @@ class _Task:
 
     def wait(self) -> BaseException | None:
         """Until it has ended; returns what it raised."""
+        for _ in range(_LOOKS):
+            if not self._end.empty():
+                break
+            sleep(0)
         return self._end.get()
 
 

@@ -12,6 +12,7 @@ if not backend.why_no_compiler():
     import raytracer.kernels  # noqa: F401 (brings select for lanes)
     from raytracer import twofold
     from raytracer.kernels import lanes as k
+    from raytracer.kernels.cells import spot_of
     from raytracer.kernels.compiler import borrowing
 
     EIGHT = np.uint64(8)
@@ -140,12 +141,35 @@ def test_places_are_compared_and_picked():
     assert out.tolist() == [*range(0, 24, 3), *range(1, 72, 9), *whole.astype(int).tolist()]
 
 
-def test_powers_and_the_smallest():
+def test_the_smallest():
     @borrowing
-    def run(a, b, out):
-        k.store(out, 0, k.raised(k.load(a, 0), k.load(b, 0)))
-        return k.smallest_of(k.load(b, 0))
+    def run(a):
+        return k.smallest_of(k.load(a, 0))
 
-    a, b, out = np.linspace(0, 1, 8), np.array([0, 1, 2, 0.5, -1, 20, 2.5, 3]), np.empty(8)
-    assert run(a, b, out) == -1
-    np.testing.assert_allclose(out, a**b, rtol=1e-15)
+    assert run(np.array([0, 1, 2, 0.5, -1, 20, 2.5, 3])) == -1
+
+
+def test_spots_in_a_box_of_a_cell():
+    """`in_box` for all corners of a cell and for boxes at its edges, against comparisons."""
+
+    @borrowing
+    def run(x, y, box):
+        return k.bits_of(k.in_box(spot_of(k.load(x, 0), k.load(y, 0)), box))
+
+    x = np.array([0, 1, 5, 63, 64, 126, 127, 127], np.int32)
+    for y in (x, x[::-1].copy(), np.full(8, 64, np.int32)):
+        for left, right, top, bottom in ((0, 127, 0, 127), (1, 126, 0, 127), (64, 64, 5, 64), (0, 0, 127, 127)):
+            box = np.int32(left | (127 - right) << 8 | top << 16 | (127 - bottom) << 24)
+            expected = (left <= x) & (x <= right) & (top <= y) & (y <= bottom)
+            assert run(x, y, box) == sum(1 << i for i in range(8) if expected[i])
+    assert lane_numbers_of() == list(range(8))
+
+
+def lane_numbers_of():
+    @borrowing
+    def run(out):
+        k.store(out, 0, k.lane_numbers())
+
+    out = np.empty(8, np.int32)
+    run(out)
+    return out.tolist()

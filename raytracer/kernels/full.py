@@ -41,7 +41,6 @@ from raytracer.kernels.lanes import (
     is_hit,
     lane_numbers,
     load,
-    raised,
     same,
     smallest_of,
     spread,
@@ -71,7 +70,7 @@ def radiance(view, paints, t, d, where, hit, x, row, scratch):
     for bounce in range(MOST_REFLECTIONS + 1):
         material, shown = spread(np.int32(3)) * numbers_at(view.material, where), weight > 0.0
         ambient = rows_at(paints.surfaces, material + spread(np.int32(1)))
-        light = _light(view, paints, p, n, radius, d, where, shown, material)
+        light = _light(view, paints, p, n, radius, d, where, shown, material, scratch)
         red = red + select(shown, weight * (ambient[0] + light[0]), 0.0)
         green = green + select(shown, weight * (ambient[1] + light[1]), 0.0)
         blue = blue + select(shown, weight * (ambient[2] + light[2]), 0.0)
@@ -95,7 +94,7 @@ def radiance(view, paints, t, d, where, hit, x, row, scratch):
 
 
 @inlined
-def _light(view, paints, p, n, radius, d, where, shown, material):
+def _light(view, paints, p, n, radius, d, where, shown, material, scratch):
     """What all lights add, where it is shown."""
     red, green, blue, spark, lights = spread(0.0), spread(0.0), spread(0.0), spread(0.0), paints.lights
     dr, dg, db, power = rows_at(paints.surfaces, material)
@@ -110,7 +109,7 @@ def _light(view, paints, p, n, radius, d, where, shown, material):
         shine = cosine(facing, square, radius)
         if sparkles:
             spark = highlight(p, n, radius, light, square, unit)
-            spark = raised_to_whole(spark, power, paints.bits) if paints.bits >= 0 else raised(spark, power)
+            spark = raised_to_whole(spark, power, paints.bits) if paints.bits >= 0 else _raised(spark, power, scratch)
             spark = select(shiny, spark, 0.0)
         lit = shown & ((shine > 0.0) | (spark > 0.0))
         if paints.shadows and any_of(lit):
@@ -120,6 +119,16 @@ def _light(view, paints, p, n, radius, d, where, shown, material):
             green = green + select(lit, lights[i, 4] * (dg * shine + sg * spark), 0.0)
             blue = blue + select(lit, lights[i, 5] * (db * shine + sb * spark), 0.0)
     return red, green, blue
+
+
+@inlined
+def _raised(x, power, scratch):
+    """Each lane to the power that the other has there, one after the other."""
+    store(scratch.batch, 0, x)
+    store(scratch.batch, WIDTH, power)
+    for lane in range(np.uint64(WIDTH)):
+        scratch.batch[lane] = scratch.batch[lane] ** scratch.batch[lane + np.uint64(WIDTH)]
+    return load(scratch.batch, 0)
 
 
 @inlined

@@ -287,22 +287,6 @@ def whole(typing, lanes):
 
 
 @intrinsic
-def raised(typing, lanes, power):
-    """Each lane to the power that the other has there, one after the other."""
-
-    def lower(context, builder, sig, args):
-        kind, found = ir.FunctionType(_DOUBLE, [_DOUBLE, _DOUBLE]), args[0]
-        function = get_or_insert_function(builder.module, kind, "llvm.pow.f64")
-        for lane in range(WIDTH):
-            where = ir.Constant(_INT32, lane)
-            one = builder.call(function, [builder.extract_element(each, where) for each in args])
-            found = builder.insert_element(found, one, where)
-        return found
-
-    return LANES(lanes, power), lower
-
-
-@intrinsic
 def at_least(typing, places, number):
     """Where a place is not below a number."""
 
