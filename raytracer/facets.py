@@ -69,10 +69,10 @@ def volume_of(of: Measures) -> tuple[Number, Number, Number]:
     return volume, usual, usual & (abs(volume) > STEEP * (of.lengths[0] * of.lengths[1] * of.size))
 
 
-def plane_of(corners: ThreeVectors, nearest: Three, volume: Number) -> Four:
-    """A row of `Facets.planes`."""
-    sign, (x, y, z) = -sign_of(volume), unit_normal(corners)
-    x, y, z = sign * x, sign * y, sign * z
+def plane_of(normal: Three, nearest: Three, volume: Number) -> Four:
+    """A row of `Facets.planes`, for a normal of length 1."""
+    sign = -sign_of(volume)
+    x, y, z = sign * normal[0], sign * normal[1], sign * normal[2]
     return x, y, z, inner((x, y, z), nearest)
 
 
@@ -82,7 +82,11 @@ def unit_normal(corners: ThreeVectors) -> Three:
     down = -exponent(_larger(_larger(_largest(a), _largest(b)), _largest(c))) - 1
     a, b, c = scaled(a, down), scaled(b, down), scaled(c, down)
     ab, bc = minus(b, a), minus(c, b)
-    normal = cross(scaled(ab, -exponent(_largest(ab))), scaled(bc, -exponent(_largest(bc))))
+    return of_length_1(cross(scaled(ab, -exponent(_largest(ab))), scaled(bc, -exponent(_largest(bc)))))
+
+
+def of_length_1(normal: Three) -> Three:
+    """`unit_normal` from a normal of usual size: the same bits, as powers of two change none."""
     size = _size(normal)
     return normal[0] / size, normal[1] / size, normal[2] / size
 
@@ -150,14 +154,14 @@ def see_facets(grid: Grid, kappa: float, origin: np.ndarray, corners: np.ndarray
     axes = grid.u, grid.v, tuple(np.negative(grid.back))
     parts = [inner(vector, axis) for vector in vectors for axis in axes]
     rows = np.where(over_reach > 0.0, parts, 0.0).T
-    planes = np.column_stack(plane_of(vectors_of(corners), of.nearest, volume))
+    planes = np.column_stack(plane_of(unit_normal(vectors_of(corners)), of.nearest, volume))
     return Facets(rows, np.where(over_reach > 0.0, distance, 0.0), planes, volume != 0.0)
 
 
 def planes_of(origin: np.ndarray, corners: np.ndarray) -> np.ndarray:
     """The planes of triangles (n, 3, 3) as seen from an origin (3,): see `Facets.planes`."""
     of, volume, _ = _measured(origin, corners)
-    return np.column_stack(plane_of(vectors_of(corners), of.nearest, volume))
+    return np.column_stack(plane_of(unit_normal(vectors_of(corners)), of.nearest, volume))
 
 
 def _measured(origin: np.ndarray, corners: np.ndarray) -> tuple[Measures, np.ndarray, np.ndarray]:

@@ -53,7 +53,7 @@ from raytracer.lookup import light_cells, tree_of
 from raytracer.mirrors import NO_MIRRORS, see_mirrors
 from raytracer.plan import Plan
 from raytracer.pool import cores, share
-from raytracer.scene import Colour, Materials, Scene, Triangles
+from raytracer.scene import Camera, Colour, Light, Materials, Scene, Triangles
 from raytracer.settle import Bundle, Index, Targets, known_in_integers, polish, settled
 from raytracer.shading import to_byte
 from raytracer.stages import light_from_eye
@@ -77,6 +77,7 @@ class Workspace:
 
     def __init__(self) -> None:
         self._arrays: dict[tuple[str, int], np.ndarray] = {}
+        self.desks: dict[int, Desk] = {}  # of the threads
 
     def array(self, size: int, kind: type, name: str, worker: int = 0) -> np.ndarray:
         """An array of that size, with anything in it."""
@@ -306,11 +307,15 @@ def _bytes_of(colour: Colour) -> np.ndarray:
 def make_paints(plan: Plan, screen: Screen) -> Paints:
     """What the plan's stage is painted with."""
     flat, background = plan.stage.flat(plan.scene)
-    lights = [(*light_from_eye(light, plan.scene.camera, screen.unit).tolist(), *light.colour) for light in plan.lights]
-    return Paints(
-        _bytes_of(background), _bytes_of(flat), np.array(lights, np.float64).reshape(-1, 6),
-        plan.scene.materials.diffuse.reshape(-1),
-    )  # fmt: skip
+    lights = _lights_from_eye(plan.lights, plan.scene.camera, screen.unit)
+    return Paints(_bytes_of(background), _bytes_of(flat), lights, plan.scene.materials.diffuse.reshape(-1))
+
+
+@lru_cache(maxsize=8)
+def _lights_from_eye(lights: tuple[Light, ...], camera: Camera, unit: int) -> np.ndarray:
+    """See `Paints.lights`."""
+    rows = [(*light_from_eye(light, camera, unit).tolist(), *light.colour) for light in lights]
+    return np.array(rows, np.float64).reshape(-1, 6)
 
 
 def make_full_paints(plan: Plan, screen: Screen) -> FullPaints:
@@ -360,19 +365,27 @@ def make_canvas(picture: np.ndarray, first_row: int = 0, wanted: np.ndarray = AL
 
 
 def _desk(workspace: Workspace, kernels: ModuleType, worker: int) -> Desk:
+    """A thread's desk, without what an earlier picture has left on it."""
+    desk = workspace.desks.get(worker)
+    if desk is None:
+        desk = workspace.desks[worker] = _new_desk(workspace, kernels, worker)
+    desk.doubts[0] = 0
+    desk.scratch.doubt[:] = False
+    return desk
+
+
+def _new_desk(workspace: Workspace, kernels: ModuleType, worker: int) -> Desk:
     size, array = (kernels.TILE_HEIGHT + 1) * kernels.STRIDE, workspace.array
-    doubts = array(_DOUBTS, np.int64, "doubts", worker)
-    doubts[0] = 0
     scratch = Scratch(
         array(size, np.float64, "k", worker),
         array(size, np.int32, "index", worker),
-        workspace.zeros(size, np.bool_, "doubt", worker),
+        array(size, np.bool_, "doubt", worker),
         array(64, np.float64, "batch", worker),
         array(_STACK, np.int64, "stack", worker),
         array(_STACK, np.float64, "near", worker),
         array(32, np.uint8, "rest", worker),
     )
-    return Desk(scratch, doubts)
+    return Desk(scratch, array(_DOUBTS, np.int64, "doubts", worker))
 
 
 def _view(raster: Raster, origin: np.ndarray, balls: np.ndarray, material: np.ndarray) -> View:

@@ -12,8 +12,17 @@ import numpy as np
 
 from raytracer.arrays import CORNERS, FACET
 from raytracer.boxes import facet_box
-from raytracer.certified import inner
-from raytracer.facets import measure, plane_of, side_of_edge, slope_of, volume_of, zero_side
+from raytracer.certified import SMALLEST, inner
+from raytracer.facets import (
+    measure,
+    of_length_1,
+    plane_of,
+    side_of_edge,
+    slope_of,
+    unit_normal,
+    volume_of,
+    zero_side,
+)
 from raytracer.kernels.compiler import borrowing, inlined
 
 
@@ -34,18 +43,18 @@ def see_facets(lens, frame, reach, kappa, eye, corners, numbers, volumes, table,
         volumes[i] = volume
         _put_corners(away, np.uint64(CORNERS) * i, eye, triangle)
         at, known = np.uint64(FACET) * i, usual and kappa > 0.0
-        normal, distance = slope_of(of, volume, 1.0 / reach)
+        slope, distance = slope_of(of, volume, 1.0 / reach)
         table[at + np.uint64(12)] = distance if known else 0.0
-        _put(table, at + np.uint64(9), normal, u, v, ahead, known)
+        _put(table, at + np.uint64(9), slope, u, v, ahead, known)
         for edge in range(3):
             side = side_of_edge(of, edge, volume, 1.0 / reach)
             _put(table, at + np.uint64(3 * edge), side, u, v, ahead, known)
             table[at + np.uint64(13 + edge)] = zero_side(of, edge, u, v, w)
             table[at + np.uint64(16 + edge)] = numbers[i, edge]
-        plane, box = (
-            plane_of(triangle, of.nearest, volume),
-            facet_box(lens, of.corners[0], of.corners[1], of.corners[2]),
-        )
+        x, y, z = of.normal
+        normal = of_length_1(of.normal) if usual and inner(x, y, z, x, y, z) > SMALLEST else unit_normal(triangle)
+        plane = plane_of(normal, of.nearest, volume)
+        box = facet_box(lens, of.corners[0], of.corners[1], of.corners[2])
         for side in range(4):
             planes[np.uint64(4) * i + np.uint64(side)] = plane[side]
             boxes[np.uint64(4) * i + np.uint64(side)] = np.int32(box[side]) if volume != 0.0 else np.int32(0)
