@@ -2,7 +2,8 @@
 
 Rays towards a light: the directions from it are cut into the cells of a cube, each with a list of the shapes that the
 light may see there. Each face of the cube is a picture of the shapes as an eye at the light would see it, a cell being
-a pixel, and the boxes of pixels are those of `boxes`, widened from the corners of pixels to all of their area.
+128 × 128 pixels of it, and the boxes of pixels are those of `boxes`, widened from the corners of pixels to all of their
+area (see `kernels.cells`).
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ def light_cells(
     """The lists of the cubes of all lights, given by their places, one cube behind the other.
 
     Each cube ends with one cell more: the list of the light's walls (see `_walls`), which are in no other. And which
-    shapes are to be asked for those: int32 (lights · shapes,), not 0 where they are.
+    shapes are to be asked for those: int32 (lights · shapes,), not 0 where they are; or (0,) if none are.
     """
     balls, corners = _in_units(spheres, triangles, unit)
     size = resolution_for(len(spheres) + len(triangles))
@@ -51,6 +52,8 @@ def light_cells(
     ends = np.cumsum([0, *(len(entries) // 2 for _, entries, _ in cubes)])
     starts = [starts[:-1] + end for (starts, _, _), end in zip(cubes, ends[:-1], strict=True)]
     entries, beyond = (np.concatenate([*(cube[i] for cube in cubes), np.empty(0, np.int32)]) for i in (1, 2))
+    if not beyond.any():
+        beyond = np.empty(0, np.int32)
     return Cells(np.concatenate([*starts, ends[-1:]]), entries, size, size * size), beyond
 
 

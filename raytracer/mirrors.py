@@ -30,15 +30,19 @@ NO_MIRRORS = Mirrors(np.empty(0, np.int32), Cells(np.empty(0, np.int64), np.empt
 
 
 @lru_cache(maxsize=8)
+@np.errstate(all="ignore")
 def mirror_planes(triangles: Triangles, spheres: int, unit: int) -> tuple[list[list[float]], np.ndarray]:
-    """The planes of triangles that are mirrors, and of each shape the number of its plane, −1 for none.
+    """The planes of the largest triangles that are mirrors, and of each shape the number of its plane, −1 for none.
 
     Planes are rows n, n·X, lengths in 2**unit (see `units`). The numbers, int32, are those of so many rows of spheres
-    and then of the triangles.
+    and then of the triangles. Where there are few shapes, all is told to be in none.
     """
     numbers = np.full(spheres + len(triangles), -1, np.int32)
     planes: list[list[float]] = []
+    if len(numbers) <= _FEW:
+        return planes, numbers
     left = np.flatnonzero(triangles.materials.table[triangles.material, 10] > 0.0)
+    left = left[np.argsort(-np.ptp(triangles.vertices[left], axis=1).max(axis=1, initial=0.0), kind="stable")]
     corners = np.ldexp(triangles.vertices[left], -unit)
     normals = np.stack(cross(*(np.moveaxis(corners[:, i] - corners[:, 0], -1, 0) for i in (1, 2))), axis=-1)
     normals /= np.abs(normals).max(axis=1, keepdims=True)
@@ -60,7 +64,7 @@ def see_mirrors(
 ) -> Mirrors:
     """Where on a screen the mirror images of all shapes are: of spheres' `balls` and triangles' corners, in units."""
     shapes, (planes, numbers) = len(balls) + len(corners), mirror_planes(triangles, len(balls), unit)
-    if not planes or shapes <= _FEW:
+    if not planes:
         return NO_MIRRORS
     boxes = np.empty((len(planes), shapes, 4), np.int32)
     for plane, own in zip(planes, boxes, strict=True):

@@ -17,6 +17,7 @@ from raytracer.eye import Eye, open_eye
 from raytracer.full import terms_of
 from raytracer.image import Depth
 from raytracer.methods import CERTIFIED, Method, row_of
+from raytracer.mirrors import mirror_planes
 from raytracer.scene import Light, Scene
 from raytracer.stages import LIGHT_RANGE, STAGES, Stage
 from raytracer.units import scene_units
@@ -203,6 +204,8 @@ def _reasons_for_terms(scene: Scene, lights: tuple[Light, ...]) -> Iterator[str]
         yield "no specular colour: no highlights"
     if terms.mirrors:
         yield f"k_refl given: reflected rays, at most {MOST_REFLECTIONS} after each other"
+        if planes := mirror_planes(scene.triangles, len(scene.spheres.balls), scene_units(scene)[0])[0]:
+            yield f"{_count(planes, 'plane mirror')}: what is seen there is looked up where its image is on the screen"
     else:
         yield "no k_refl above 0: no reflected rays"
 

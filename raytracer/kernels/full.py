@@ -164,7 +164,7 @@ def _blocked(view, paints, i, p, light, a, where, size, asked):
 @inlined
 def _beyond_walls(view, paints, i, cell, where, asked):
     """Which of the asked rays light i's walls may block: those from shapes that are not all on its side of them."""
-    if paints.cells.starts[cell] == paints.cells.starts[cell + 1]:
+    if len(paints.beyond) == 0 or paints.cells.starts[cell] == paints.cells.starts[cell + 1]:
         return asked & ~asked
     shapes = len(paints.beyond) // len(paints.lights)
     return asked & at_least(numbers_at(paints.beyond, where + spread(np.int32(i * shapes))), 1)
