@@ -98,6 +98,7 @@ class Plan:
         return not max(far, default=0.0) < 2.0**LIGHT_RANGE
 
     @property
+    @np.errstate(all="ignore")
     def _has_squares(self) -> bool:
         """Whether float64 holds the squares of all lengths that light meets, so that boxes of shapes can be trusted."""
         scene, camera = self.scene, self.scene.camera
@@ -106,8 +107,7 @@ class Plan:
         smallest = min(scene.spheres.smallest, scene.triangles.smallest, *lengths, inf)
         largest = max(scene.spheres.largest, scene.triangles.largest, *lengths, 0.0)
         if unit := scene_units(scene)[0]:
-            with np.errstate(all="ignore"):
-                smallest, largest = np.ldexp((smallest, largest), -unit).tolist()
+            smallest, largest = np.ldexp((smallest, largest), -unit).tolist()
         return bool(smallest > _LEAST and largest < _MOST and _LEAST < eye_grid(self.raster).reach < _MOST)
 
     @property
