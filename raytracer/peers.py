@@ -11,10 +11,13 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable
+from concurrent.futures import Executor, ProcessPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
 from math import floor, inf, radians, sqrt, tan
+from multiprocessing import get_context
 from pathlib import Path
 from shutil import which
 from tempfile import TemporaryDirectory
@@ -135,6 +138,42 @@ def shade(ray: Ray, hit: Hit, scene: Scene) -> list[int]:
 def unit(v: list[float]) -> list[float]:
     length = sqrt(sum(x * x for x in v))
     return [x / length for x in v]
+
+
+# ------------------------------------------------------------------------------------------------ apart
+
+Ready = Callable[[Scene, int, int], Draw]
+
+_there: tuple[Draw, np.ndarray] | None = None  # in a peer's own process: how it draws, and where
+
+
+def apart(ready: Ready, scene: Scene, width: int, height: int) -> Draw:
+    """A peer in a process of its own: its threads, waiting for work, would slow down those of the others.
+
+    What it draws lies in memory that both processes share.
+    """
+    folder = TemporaryDirectory()
+    place = str(Path(folder.name) / "picture")
+    picture = np.memmap(place, np.uint8, "w+", shape=(height, width, 3))
+    process = ProcessPoolExecutor(1, get_context("spawn"), _get_ready, (ready, scene, width, height, place))
+    process.submit(int).result()  # so that no picture is waited for until it is ready
+    return partial(_draw_apart, process, picture, folder)
+
+
+def _draw_apart(process: Executor, picture: np.ndarray, folder: TemporaryDirectory[str], camera: Camera) -> np.ndarray:
+    process.submit(_draw_there, camera).result()
+    return picture
+
+
+def _get_ready(ready: Ready, scene: Scene, width: int, height: int, place: str) -> None:
+    global _there
+    _there = ready(scene, width, height), np.memmap(place, np.uint8, "r+", shape=(height, width, 3))
+
+
+def _draw_there(camera: Camera) -> None:
+    assert _there is not None
+    draw, picture = _there
+    picture[:] = draw(camera)
 
 
 # ------------------------------------------------------------------------------------------------ Mitsuba
@@ -261,7 +300,7 @@ PEERS = (
         "the same picture in float32, no decision checked; its BVH takes rays of any origin, and was built beforehand",
         "as a library, llvm_ad_rgb: sphere shapes, ray_intersect_preliminary with our eye rays, our lights in drjit",
         why_not_mitsuba,
-        mitsuba,
+        partial(apart, mitsuba),
         10_000,
         False,
     ),

@@ -331,6 +331,13 @@ def test_the_line_that_names_the_fault_is_found():
     assert first_fault("") == "it ended without a word"
 
 
+def test_a_peer_apart_draws_what_it_draws_here():
+    scene = spread(20)
+    here, there = peers.python_loop(scene, 40, 22), peers.apart(peers.python_loop, scene, 40, 22)
+    for camera in cameras(scene)[:2]:
+        np.testing.assert_array_equal(there(camera), here(camera))
+
+
 def test_mitsuba_draws_our_picture_where_it_can():
     pytest.importorskip("mitsuba")
     if fault := peers.why_not_mitsuba():
