@@ -198,6 +198,7 @@ class Tree(NamedTuple):
 
 
 FACET = 24  # numbers a triangle, of which some are to spare
+CELL_BITS = 7  # a cell of `Cells` is at most 2**7 pixels wide and high
 CORNERS = 12  # numbers a triangle at the stage `full`: its corners, how far away they are, and some to spare
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
@@ -25,15 +26,20 @@ def end_at_once() -> None:
 def noted() -> Iterator[None]:
     """While this lasts, a signal to end raises KeyboardInterrupt, and is remembered.
 
-    In the middle of compiling that exception may be swallowed, or become another one. What is ignored, as by `nohup`,
-    stays so.
+    In the middle of compiling that exception may be swallowed, or become another one; where Python can only write down
+    an exception, as in `__del__`, this one is not written down. What is ignored, as by `nohup`, stays so.
     """
 
     def note(number: int, frame: FrameType | None) -> None:
         _came.append(number)
         raise KeyboardInterrupt
 
+    def say(unraisable: sys.UnraisableHookArgs) -> None:
+        if not (_came and isinstance(unraisable.exc_value, KeyboardInterrupt)):
+            saying(unraisable)
+
     _came.clear()
+    saying, sys.unraisablehook = sys.unraisablehook, say
     before = {number: signal.getsignal(number) for number in _ENDING}
     heeded = [number for number in _ENDING if before[number] is not signal.SIG_IGN]
     try:
@@ -43,6 +49,7 @@ def noted() -> Iterator[None]:
     finally:
         for number in heeded:
             signal.signal(number, before[number] or signal.SIG_DFL)
+        sys.unraisablehook = saying
 
 
 def came() -> bool:

@@ -13,22 +13,19 @@ from types import ModuleType
 
 import numpy as np
 
-from raytracer.arrays import Cells, Tree
-from raytracer.bounce import LEAVING
+from raytracer.arrays import CELL_BITS, Cells, Tree
 from raytracer.boxes import Lens, make_lens
 from raytracer.camera import make_raster
-from raytracer.facets import unit_normal
 from raytracer.scene import Camera, Spheres, Triangles, Vector, vector
+from raytracer.walls import Wall, find_walls, walls_of
 
 _MOST = 512  # cells along an edge of the cube
 _KEPT = 8  # scenes' cubes, and trees
 _LARGE = 8.0  # times the size that half of the shapes do not exceed
 _WIDER = 2.0**-46  # of a box, and of its distance from the origin
+_ANY_NUMBER = 1 << 62
 _ALL_OF_CELL = 0  # as the box of an entry
-_MOST_WALLS, _FEW_OF = 12, 8  # beyond a wall there is no more than one shape of so many
-_ROUNDING = 2.0**-50  # of all lengths that come together in a height above a plane: more than it is off
-_UNSEEN = LEAVING / 4.0  # of a triangle's longest edge: of its farthest corner's distance at least half as much
-_SHIFT = 7  # a cell is 2**_SHIFT pixels wide and high
+_MOST_ASKED = 1 << 28  # lights times shapes: beyond, it takes too much memory to know who is asked for walls
 _NO_PLANE = (0.0, 0.0, 0.0, 0.0)
 
 
@@ -37,18 +34,29 @@ def resolution_for(shapes: int) -> int:
     return min(_MOST, 1 << ((max(4 * shapes, 4) - 1).bit_length() + 1) // 2)
 
 
+def reach_of(spheres: Spheres, triangles: Triangles, unit: int, eye: Vector) -> float:
+    """At least all lengths of a scene, the eye's distance from the origin included: a power of two, in 2**unit.
+
+    Rays are rounded in these; what is kept for one is good for eyes that are not farther away.
+    """
+    largest = np.ldexp(max(spheres.largest, triangles.largest), -unit)
+    return float(np.ldexp(1.0, int(np.frexp(max(largest, *map(abs, eye)))[1]) + 2))
+
+
 @lru_cache(maxsize=_KEPT)
 def light_cells(
-    spheres: Spheres, triangles: Triangles, unit: int, lights: tuple[Vector, ...], path: ModuleType
+    spheres: Spheres, triangles: Triangles, unit: int, reach: float, lights: tuple[Vector, ...], path: ModuleType
 ) -> tuple[Cells, np.ndarray]:
     """The lists of the cubes of all lights, given by their places, one cube behind the other.
 
-    Each cube ends with one cell more: the list of the light's walls (see `_walls`), which are in no other. And which
-    shapes are to be asked for those: int32 (lights · shapes,), not 0 where they are; or (0,) if none are.
+    reach is what `reach_of` says. Each cube ends with one cell more: the list of the light's walls (see `walls`), which
+    are in no other. And which shapes are to be asked for those: int32 (lights · shapes,), not 0 where they are; or (0,)
+    if none are.
     """
     balls, corners = _in_units(spheres, triangles, unit)
-    size = resolution_for(len(spheres) + len(triangles))
-    cubes = [_light_cells(balls, corners, np.ldexp(light, -unit), size, path) for light in lights]
+    size, shapes = resolution_for(len(spheres) + len(triangles)), len(balls) + len(corners)
+    walls = find_walls(balls, corners, reach) if len(lights) * shapes < _MOST_ASKED else []
+    cubes = [_light_cells(balls, corners, walls, reach, np.ldexp(light, -unit), size, path) for light in lights]
     ends = np.cumsum([0, *(len(entries) // 2 for _, entries, _ in cubes)])
     starts = [starts[:-1] + end for (starts, _, _), end in zip(cubes, ends[:-1], strict=True)]
     entries, beyond = (np.concatenate([*(cube[i] for cube in cubes), np.empty(0, np.int32)]) for i in (1, 2))
@@ -90,45 +98,26 @@ def _order(along: np.ndarray, sizes: np.ndarray) -> np.ndarray:
 
 
 def _light_cells(
-    balls: np.ndarray, corners: np.ndarray, light: np.ndarray, size: int, path: ModuleType
+    balls: np.ndarray,
+    corners: np.ndarray,
+    walls: list[Wall],
+    reach: float,
+    light: np.ndarray,
+    size: int,
+    path: ModuleType,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The cells of a cube's six faces, and of its walls: starts, entries, and which shapes are beyond those.
 
     A pixel may be seen through all of its area, not from its corner alone.
     """
-    walls, beyond = _walls(balls, corners, light)
+    rows, beyond = walls_of(walls, light, reach, len(balls) + len(corners))
     boxes = np.empty((6, len(balls) + len(corners), 4), np.int32)
     for lens, face in zip(_lenses(size), boxes, strict=True):
-        path.bound_images(lens, vector(light), _NO_PLANE, balls.reshape(-1), corners, face.reshape(-1))
-    boxes[:, walls] = 0
-    starts, entries = path.sort_into_cells(boxes, size, size, _SHIFT, 1)
-    last = np.column_stack([walls, np.full(len(walls), _ALL_OF_CELL)]).astype(np.int32)
-    return np.append(starts, starts[-1] + len(walls)), np.append(entries, last), beyond
-
-
-def _walls(balls: np.ndarray, corners: np.ndarray, light: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Triangles that shade nearly nothing: the light and nearly all shapes are on one side of them. Their rows, int64.
-
-    And which shapes are not on that side of all of them, int32 (shapes,). Such are a ground and the walls of a room, so
-    only the largest are looked at. A shape may reach beyond a plane by so little that `bounce.plane_ahead` does not see
-    it.
-    """
-    rows, found = np.concatenate([balls.reshape(-1), corners.reshape(-1)]), []
-    beyond_any = np.zeros(len(balls) + len(corners), bool)
-    edges = np.sqrt(((corners - np.roll(corners, 1, axis=1)) ** 2).sum(axis=2).max(axis=1, initial=0.0))
-    for i in np.argsort(-edges, kind="stable")[:_MOST_WALLS].tolist():
-        first, second, third = map(vector, corners[i])
-        normal = np.array(unit_normal((first, second, third)))
-        middle = normal @ corners[i, 0]
-        height = normal @ light - middle
-        side = np.copysign(1.0, height)
-        heights = side * (balls[:, :3] @ normal - middle) - balls[:, 3], side * (corners @ normal - middle)
-        error = _ROUNDING * (np.abs(light).max() + np.nanmax(np.abs(rows)) + abs(middle))
-        beyond = np.concatenate([heights[0], heights[1].min(axis=1)]) < error - _UNSEEN * edges[i]
-        if abs(height) > error and np.count_nonzero(beyond) <= len(beyond) // _FEW_OF:
-            beyond_any |= beyond
-            found.append(len(balls) + i)
-    return np.array(found, np.int64), beyond_any.astype(np.int32)
+        path.bound_images(lens, vector(light), (*_NO_PLANE, reach), balls.reshape(-1), corners, face.reshape(-1))
+    boxes[:, rows] = 0
+    starts, entries = path.sort_into_cells(boxes, size, size, CELL_BITS, 1, _ANY_NUMBER)
+    last = np.column_stack([rows, np.full(len(rows), _ALL_OF_CELL)]).astype(np.int32)
+    return np.append(starts, starts[-1] + len(rows)), np.append(entries, last), beyond
 
 
 @lru_cache(maxsize=16)
@@ -140,5 +129,5 @@ def _lenses(size: int) -> list[Lens]:
             u, v, w = (np.zeros(3) for _ in range(3))
             u[(axis + 1) % 3], v[(axis + 2) % 3], w[axis] = 1.0, -1.0, -sign
             camera = Camera((0.0, 0.0, 0.0), vector(u), vector(v), vector(w), 90.0)
-            lenses.append(make_lens(make_raster(camera, size, size).finer(1 << _SHIFT)))
+            lenses.append(make_lens(make_raster(camera, size, size).finer(1 << CELL_BITS)))
     return lenses

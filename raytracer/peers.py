@@ -150,7 +150,7 @@ _there: tuple[Draw, np.ndarray] | None = None  # in a peer's own process: how it
 def apart(ready: Ready, scene: Scene, width: int, height: int) -> Draw:
     """A peer in a process of its own: its threads, waiting for work, would slow down those of the others.
 
-    What it draws lies in memory that both processes share.
+    What it draws is copied to memory that both processes share, the same for each picture. That is in its time.
     """
     folder = TemporaryDirectory()
     place = str(Path(folder.name) / "picture")

@@ -175,7 +175,7 @@ def _reasons(plan: Plan) -> Iterator[str]:
         yield "no point, no normal: this stage asks only what is hit"
     yield from _reasons_for_lights(plan)
     if stage.throws_on:
-        yield from _reasons_for_terms(scene, plan.lights)
+        yield from _reasons_for_terms(plan)
     else:
         table = scene.materials.table
         for columns, word in ((table[:, 3:6], "ambient"), (table[:, 6:9], "specular"), (table[:, 10], "k_refl")):
@@ -189,7 +189,8 @@ def _reasons(plan: Plan) -> Iterator[str]:
         yield "the whole picture's hits are kept: this stage compares pixels with each other"
 
 
-def _reasons_for_terms(scene: Scene, lights: tuple[Light, ...]) -> Iterator[str]:
+def _reasons_for_terms(plan: Plan) -> Iterator[str]:
+    scene, lights = plan.scene, plan.lights
     terms = terms_of(scene, bool(lights))
     if terms.shadows:
         yield "a shadow ray to each light that a surface faces: the light's own cells say which shapes may be between"
@@ -204,7 +205,8 @@ def _reasons_for_terms(scene: Scene, lights: tuple[Light, ...]) -> Iterator[str]
         yield "no specular colour: no highlights"
     if terms.mirrors:
         yield f"k_refl given: reflected rays, at most {MOST_REFLECTIONS} after each other"
-        if planes := mirror_planes(scene.triangles, len(scene.spheres.balls), scene_units(scene)[0])[0]:
+        planes, _ = mirror_planes(scene.triangles, len(scene.spheres.balls), scene_units(scene)[0])
+        if planes and plan.painter:
             yield f"{_count(planes, 'plane mirror')}: what is seen there is looked up where its image is on the screen"
     else:
         yield "no k_refl above 0: no reflected rays"

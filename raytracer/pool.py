@@ -46,12 +46,18 @@ class _Task:
         self._end.put(error)
 
     def wait(self) -> BaseException | None:
-        """Until it has ended; returns what it raised."""
-        for _ in range(_LOOKS):
-            if not self._end.empty():
-                break
-            sleep(0)
-        return self._end.get()
+        """Until it has ended, also if that is interrupted; returns what was raised."""
+        interrupted: BaseException | None = None
+        while True:
+            try:
+                for _ in range(_LOOKS):
+                    if not self._end.empty():
+                        break
+                    sleep(0)
+                error = self._end.get()
+                return interrupted or error
+            except KeyboardInterrupt as interrupt:
+                interrupted = interrupt
 
 
 def _help(tasks: SimpleQueue[_Task]) -> None:

@@ -49,7 +49,7 @@ from raytracer.camera import Raster, eye_grid, fine_columns, fine_rows
 from raytracer.eye import bundle_of, usable_spread
 from raytracer.facets import exact_volume
 from raytracer.full import surfaces_of, terms_of
-from raytracer.lookup import light_cells, tree_of
+from raytracer.lookup import light_cells, reach_of, tree_of
 from raytracer.mirrors import NO_MIRRORS, see_mirrors
 from raytracer.plan import Plan
 from raytracer.pool import cores, share
@@ -326,7 +326,7 @@ def make_full_paints(plan: Plan, screen: Screen) -> FullPaints:
     glass = _glass(scene, screen) if terms.mirrors else NO_MIRRORS
     return FullPaints(
         paints.background, scene.background, paints.lights, surfaces_of(scene.materials).reshape(-1),
-        *light_cells(*shapes, screen.unit, lights, screen.kernels),
+        *light_cells(*shapes, screen.unit, reach_of(*shapes, screen.unit, screen.view.eye), lights, screen.kernels),
         tree_of(*shapes, screen.unit, screen.kernels), glass,
         terms.bits, terms.specular, terms.shadows, terms.mirrors,
     )  # fmt: skip
@@ -334,8 +334,9 @@ def make_full_paints(plan: Plan, screen: Screen) -> FullPaints:
 
 def _glass(scene: Scene, screen: Screen) -> Mirrors:
     balls, corners = screen.targets.balls, screen.targets.corners
+    shown = screen.bins.boxes.reshape(-1, 4)[: len(balls) + len(corners)]
     return see_mirrors(
-        make_lens(screen.raster), screen.view.eye, balls, corners, scene.triangles, screen.unit, screen.kernels
+        make_lens(screen.raster), screen.view.eye, balls, corners, scene.triangles, screen.unit, shown, screen.kernels
     )
 
 

@@ -104,7 +104,7 @@ def test_rows_to_spare_are_in_no_list(balls):
     scene = interpret(text)
     first = len(scene.spheres.balls)
     expected = {*range(balls), first, first + 1}
-    cells, _ = light_cells(scene.spheres, scene.triangles, 0, ((0.0, 5.0, -5.0),), backend.load())
+    cells, _ = light_cells(scene.spheres, scene.triangles, 0, 16.0, ((0.0, 5.0, -5.0),), backend.load())
     assert set(cells.entries[::2].tolist()) == expected
     tree = tree_of(scene.spheres, scene.triangles, 0, backend.load())
     assert sorted(tree.ids[tree.ids >= 0].tolist()) == sorted(expected)

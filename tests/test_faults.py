@@ -152,6 +152,17 @@ def test_a_reader_that_has_read_enough_is_no_fault():
     assert process.wait(30) == 141
 
 
+@posix
+def test_a_signal_where_nothing_can_be_raised_is_quiet_and_remembered():
+    program = (
+        "import os, signal\nfrom raytracer import interrupts\n"
+        "class Dying:\n    def __del__(self):\n        os.kill(os.getpid(), signal.SIGTERM)\n        len('now')\n"
+        "with interrupts.noted():\n    thing = Dying()\n    del thing\n    print(interrupts.came())\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert (done.stdout, done.stderr) == ("True\n", "")
+
+
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full")
 def test_an_output_that_is_full_is_one_line():
     with Path("/dev/full").open("w") as full:

@@ -145,7 +145,7 @@ def on_a_ground(rng, below, slant):
 def test_a_ground_that_shades_nearly_nothing_is_asked_for_by_what_is_below_it(below, slant):
     scene, kernels = on_a_ground(np.random.default_rng(below), below, slant), backend.load()
     for light in scene.lights:
-        cells, beyond = light_cells(scene.spheres, scene.triangles, 0, (light.position,), kernels)
+        cells, beyond = light_cells(scene.spheres, scene.triangles, 0, 8.0, (light.position,), kernels)
         first, last = cells.starts[-2:]
         ground = len(scene.spheres.balls) + np.arange(2)
         assert set(ground) <= set(cells.entries[2 * first : 2 * last : 2].tolist())
@@ -153,6 +153,33 @@ def test_a_ground_that_shades_nearly_nothing_is_asked_for_by_what_is_below_it(be
         asked = np.flatnonzero(beyond[: len(scene.spheres)]).tolist()
         assert asked == [*range(len(scene.spheres) - below, len(scene.spheres))]
     pictures = [draw(make_plan(scene, "full", 120, 80, path=PATHS[path])) for path in ("numpy", "compiled")]
+    np.testing.assert_array_equal(*pictures)
+
+
+@both_paths
+@pytest.mark.parametrize("height", [1e-8, 1e-12])
+@pytest.mark.parametrize("away", [1e4, 1e8])
+def test_a_light_close_to_the_ground_seen_from_far_away(away, height):
+    """Rays are rounded as seen from the eye: from there the light may be below the ground."""
+    frame, _ = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))
+    frame *= np.sign(np.linalg.det(frame))
+    c, s = math.cos(0.3), math.sin(0.3)
+
+    def words(*vectors):
+        return " ".join(repr(x) for vector in vectors for x in (np.array(vector) @ frame).tolist())
+
+    lines = [f"fov {math.degrees(3 / away)!r}", f"eye {words([0, s * away, c * away])}"]
+    lines += [f"uvw {words([1, 0, 0], [0, c, -s], [0, s, c])}", f"light {words([0.1, height, 0.2])} .8 .8 .8"]
+    lines += ["surface .6 .5 .4 .1 .1 .1 0 0 0 1 0"]
+    for three in ([-3, 0, -3], [3, 0, -3], [3, 0, 3]), ([-3, 0, -3], [3, 0, 3], [-3, 0, 3]):
+        lines += ["begin", *(f"vertex {words(corner)}" for corner in three), "end"]
+    for x in range(-4, 5):
+        lines += [
+            f"sphere .11 {words([x / 4, 0.7, 0.03 * x - 0.4])}",
+            f"sphere .11 {words([x / 4, 0.4, 0.03 * x - 0.8])}",
+        ]
+    scene = interpret("\n".join(lines))
+    pictures = [draw(make_plan(scene, "full", 80, 60, path=PATHS[path])) for path in ("numpy", "compiled")]
     np.testing.assert_array_equal(*pictures)
 
 

@@ -8,7 +8,7 @@ from raytracer import backend, make_plan
 from raytracer.boxes import make_lens
 from raytracer.camera import make_raster
 from raytracer.interpreter import interpret
-from raytracer.mirrors import mirror_planes, see_mirrors
+from raytracer.mirrors import NO_MIRRORS, mirror_planes, see_mirrors
 from raytracer.render import draw
 from raytracer.scene import Camera
 
@@ -103,6 +103,54 @@ def test_slanting_mirrors_seen_from_anywhere(seed):
         assert_both_paths_agree(scene, width, height, sampling)
 
 
+@pytest.mark.parametrize("far", [1e2, 1e6, 1e9])
+@pytest.mark.parametrize("fov", [1e-2, 1e-5])
+def test_a_mirror_that_reaches_far_seen_through_a_telescope(far, fov):
+    """The corners' rounding moves the mirrored rays by more than a pixel."""
+    rng, diagonal = np.random.default_rng(5), 2**-0.5
+    frame = turned(rng)
+    frame *= np.sign(np.linalg.det(frame))
+
+    def words(*vectors):
+        return " ".join(repr(x) for vector in vectors for x in (np.array(vector) @ frame).tolist())
+
+    text = f"fov {fov!r}\neye {words([0, 5, 5])}\nlight {words([1, 9, 3])} .8 .8 .8\n"
+    text += f"uvw {words([1, 0, 0], [0, diagonal, -diagonal], [0, diagonal, diagonal])}\n" + MIRROR
+    corners = np.array([[-far, 0, -far], [1.3 * far, 0, -0.9 * far], [0.2 * far, 0, far]])
+    text += triangle(*(corners @ frame)) + triangle(*(np.add(corners, [0, 5e-7, 0]) @ frame)) + DULL
+    width = 10 * 2**0.5 * np.radians(fov)  # of what is seen where the balls are
+    for x, y in rng.uniform(-0.6, 0.6, (30, 2)) * width:
+        place = np.array([x, 5, -5]) + y * np.array([0, diagonal, diagonal])
+        text += f"sphere {float(rng.uniform(0.02, 0.1) * width)!r} {words(place)}\n"
+    picture = assert_both_paths_agree(interpret(text), 120, 90)
+    assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 100
+
+
+def test_slivers_and_flat_frames_are_looked_for_in_the_tree():
+    sliver = triangle([-500, -1, 0], [500, -1, -0.001], [500, -1, 0.001])
+    scene = interpret("light 3 4 5 .7 .7 .7\n" + MIRROR + sliver + things(np.random.default_rng(2), 12))
+    planes, numbers = mirror_planes(scene.triangles, len(scene.spheres.balls), 0)
+    assert not planes
+    assert (numbers == -1).all()
+    rng = np.random.default_rng(3)
+    flat = interpret(
+        "uvw 1 0 0 1 1e-3 0 0 0 1\neye 0 0 4\n" + MIRROR + square([0, -1, 0], [3, 0, 0], [0, 0, 3]) + things(rng, 9)
+    )
+    assert_both_paths_agree(flat, 60, 40)
+    lens, box = make_lens(make_raster(flat.camera, 60, 40)), np.array([0, 60, 0, 40], np.int32)
+    balls, corners = flat.spheres.balls, flat.triangles.vertices
+    shown = np.tile(box, (len(balls) + len(corners), 1))
+    assert see_mirrors(lens, (0.0, 0.0, 4.0), balls, corners, flat.triangles, 0, shown, backend.load()) is NO_MIRRORS
+
+
+def test_lists_that_are_too_long_are_not_made():
+    boxes = np.tile(np.array([0, 64, 0, 64], np.int32), (1, 10, 1))
+    starts, entries = backend.load().sort_into_cells(boxes, 8, 8, 3, 0, 640)
+    assert (len(starts), len(entries)) == (65, 1280)
+    starts, entries = backend.load().sort_into_cells(boxes, 8, 8, 3, 0, 639)
+    assert (len(starts), len(entries)) == (0, 0)
+
+
 def test_a_mirror_shows_what_a_window_would_of_the_mirror_image():
     """The boxes, for each shape, are those of where it is behind the mirror; empty where the eye sees nothing of it."""
     balls = "".join(f"sphere .2 {x} 1 -6\n" for x in range(-4, 5))
@@ -110,10 +158,11 @@ def test_a_mirror_shows_what_a_window_would_of_the_mirror_image():
     image = interpret(DULL + balls.replace(" 1 -6", " -3 -6") + "sphere .2 0 -3 90\n")
     raster, kernels = make_raster(Camera(), 200, 160), backend.load()
     lens, corners = make_lens(raster), scene.triangles.vertices
-    glass = see_mirrors(lens, (0.0, 0.0, 0.0), scene.spheres.balls, corners, scene.triangles, 0, kernels)
+    shown = np.tile(np.array([0, 200, 0, 160], np.int32), (len(scene.spheres.balls) + 2, 1))
+    glass = see_mirrors(lens, (0.0, 0.0, 0.0), scene.spheres.balls, corners, scene.triangles, 0, shown, kernels)
     expected = np.zeros((len(image.spheres.balls), 4), np.int32)
     kernels.bound_images(
-        lens, (0.0, 0.0, 0.0), (0.0,) * 4, image.spheres.balls.reshape(-1), np.empty((0, 3, 3)), expected.reshape(-1)
+        lens, (0.0, 0.0, 0.0), (0.0,) * 5, image.spheres.balls.reshape(-1), np.empty((0, 3, 3)), expected.reshape(-1)
     )
     first = len(scene.spheres.balls)
     assert glass.of.tolist() == [-1] * first + [0, 0]

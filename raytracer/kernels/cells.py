@@ -15,16 +15,17 @@ each side: left, 127 − right, top, 127 − bottom, ends included. For a place 
 
 import numpy as np
 
+from raytracer.arrays import CELL_BITS
 from raytracer.boxes import beside, box_of, facet_box
 from raytracer.certified import inner, side_of
 from raytracer.kernels.compiler import borrowing, compiled, inlined
 from raytracer.kernels.lanes import WIDTH, load_rows, spread, store_boxes
 from raytracer.twofold import select
 
-_MARGIN = 2.0**-36  # see `raytracer.mirrors`
-_COVERED = 2.0**-32  # of a corner's distance: the box of a triangle is that much too large anyway
+_MARGIN = 2.0**-40  # see `raytracer.mirrors`
+_COVERED = 2.0**-31  # of a corner's distance: the box of a triangle is that much too large anyway
 _ABOUT = 1.0 + 1e-9  # times the radius of a sphere about a triangle
-_LAST = 127
+_LAST = (1 << CELL_BITS) - 1
 _CORNER = 0xFF80FF80 - 2**32  # the spot of (0, 0): the bytes 128, 255, 128, 255
 
 
@@ -32,10 +33,11 @@ _CORNER = 0xFF80FF80 - 2**32  # the spot of (0, 0): the bytes 128, 255, 128, 255
 def bound_images(lens, eye, plane, balls, corners, boxes):
     """Boxes, flat, of the images of all shapes in the mirror of a plane, given by n and n·X; of all 0 for no mirror.
 
-    Of what is hard to tell, the whole picture.
+    The plane's fifth number is of any lengths beside those of the shapes that rays are rounded in. Of what is hard to
+    tell, the whole picture.
     """
     distance = plane[3] - inner(plane[0], plane[1], plane[2], eye[0], eye[1], eye[2])
-    reach = abs(eye[0]) + abs(eye[1]) + abs(eye[2]) + abs(plane[3])
+    reach = abs(eye[0]) + abs(eye[1]) + abs(eye[2]) + abs(plane[3]) + plane[4]
     spheres = np.uint64(len(balls) // 4)
     for i in range(np.uint64(0), spheres, np.uint64(WIDTH)):
         x, y, z, radius = load_rows(balls, i)
@@ -102,24 +104,39 @@ def spot_of(x, y):
 
 
 @compiled
-def sort_into_cells(boxes, columns, rows, shift, wider):
+def sort_into_cells(boxes, columns, rows, shift, wider, most):
     """The lists of the cells, 2**shift pixels wide and high, of some screens: boxes are int32 (screens, shapes, 4).
 
-    `wider` is how many pixels a box begins too late. Returns starts, int64 (cells + 1,), and entries.
+    `wider` is how many pixels a box begins too late. Returns starts, int64 (cells + 1,), and entries; both empty if
+    there were more entries than `most`.
     """
-    screens, shapes, _ = boxes.shape
-    starts = np.zeros(screens * rows * columns + 1, np.int64)
-    for screen in range(screens):
-        for i in range(shapes):
+    starts = np.zeros(boxes.shape[0] * rows * columns + 1, np.int64)
+    _count_entries(boxes, columns, rows, shift, wider, starts)
+    for cell in range(1, len(starts)):
+        starts[cell] += starts[cell - 1]
+    if starts[-1] > most:
+        return np.empty(0, np.int64), np.empty(0, np.int32)
+    entries = np.empty(2 * starts[-1], np.int32)
+    _put_entries(boxes, columns, rows, shift, wider, starts.copy(), entries)
+    return starts, entries
+
+
+@borrowing
+def _count_entries(boxes, columns, rows, shift, wider, starts):
+    """How many entries each cell has, into the element after its own."""
+    for screen in range(boxes.shape[0]):
+        for i in range(boxes.shape[1]):
             left, right, top, bottom = _reaching(boxes, screen, i, wider)
             for row in range(top >> shift, (bottom >> shift) + 1):
                 for column in range(left >> shift, (right >> shift) + 1):
                     starts[(screen * rows + row) * columns + column + 1] += 1
-    for cell in range(1, len(starts)):
-        starts[cell] += starts[cell - 1]
-    entries, places = np.empty(2 * starts[-1], np.int32), starts.copy()
-    for screen in range(screens):
-        for i in range(shapes):
+
+
+@borrowing
+def _put_entries(boxes, columns, rows, shift, wider, places, entries):
+    """Each entry into the list of its cell; `places` is where each list goes on."""
+    for screen in range(boxes.shape[0]):
+        for i in range(boxes.shape[1]):
             left, right, top, bottom = _reaching(boxes, screen, i, wider)
             for row in range(top >> shift, (bottom >> shift) + 1):
                 for column in range(left >> shift, (right >> shift) + 1):
@@ -129,7 +146,6 @@ def sort_into_cells(boxes, columns, rows, shift, wider):
                     entries[2 * places[cell]] = i
                     entries[2 * places[cell] + 1] = first | (_LAST - last) << 8 | high << 16 | (_LAST - low) << 24
                     places[cell] += 1
-    return starts, entries
 
 
 @inlined

@@ -4,13 +4,14 @@
                       └─── mirror ─> next hit ──> the same again, weighed by k_refl
 
 Rays towards one light share an origin too: the light. Seen from there, the directions are cut into the cells of a cube,
-and each cell has the list of shapes that reach into it; a ray is tested against those of its cell (`light_cells`).
+and each cell has the list of shapes that reach into it; a ray is tested against those of its cell (`light_cells`). The
+first mirrored rays off a plane are looked up likewise, on the picture's own screen (`mirrors`), others in a tree.
 Eight rays stay together however their ways part; those that are done are only not looked at any more.
 """
 
 import numpy as np
 
-from raytracer.arrays import CORNERS
+from raytracer.arrays import CELL_BITS, CORNERS
 from raytracer.bounce import (
     MOST_REFLECTIONS,
     away_from,
@@ -51,7 +52,7 @@ from raytracer.shading import cosine, highlight, land_on_any, land_on_plane, rai
 from raytracer.twofold import select
 
 _LONGER = 1.0 + 2.0**-40
-CELL = 128.0  # pixels of a face of a light's cube that a cell is wide and high
+CELL = float(1 << CELL_BITS)  # pixels of a face of a light's cube that a cell is wide and high
 
 
 @inlined
