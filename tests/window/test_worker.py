@@ -192,6 +192,7 @@ def test_the_kernels_that_are_brought_in_are_used_next(renderer, scene):
 
 def test_without_a_compiler_nothing_is_brought_in(renderer, scene, monkeypatch):
     monkeypatch.setitem(sys.modules, "raytracer.kernels", None)  # importing it is an ImportError
+    monkeypatch.setattr(backend, "_fault", "")  # which is remembered no longer than this test lasts
     assert not worker.bring_in_kernels(answer(renderer, Request(scene, "diffuse", SIZE)))
 
 
