@@ -69,7 +69,7 @@ def see(grid: Grid | View, kappa: float, origin: np.ndarray, balls: np.ndarray, 
 
     front is what `bound` says; kappa is κ (see `certified`), or 0 where that is not known or too large for `approach`.
     """
-    eye, places, radii = xyz(origin), xyz(balls), balls[:, 3]
+    eye, places, radii = xyz(origin), xyz(balls), np.ascontiguousarray(balls[:, 3])
     x, y, z, c, _, _ = look(*eye, *places, radii)
     square = inner(x, y, z, x, y, z) + radii * radii
     edge = np.where(front, edge_of(c, square, grid.reach, kappa), 0.0)
