@@ -104,6 +104,8 @@ def status(view: View, drawing: Drawing | None, size: int, frames_a_second: floa
         time = "reading"
     elif drawing.error:
         time = "not drawn"
+    elif drawing.compiling:
+        time = "compiling, once"
     elif drawing.moving:
         time = _pace(drawing, frames_a_second)
     else:

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from raytracer import Cancelled, Scene, backend, interpreter, make_plan
+from raytracer import Cancelled, Scene, backend, interpreter, machine_code, make_plan
 from raytracer.compare import TOLERANCE, Comparison, compare, difference_picture, differences
 from raytracer.course import BLANK
 from raytracer.faults import FileError
@@ -84,6 +84,7 @@ class Drawing:
     error: str = ""  # what is wrong with the scene, or with the plugged file, in one line
     fault: FileError | None = None  # the same, if it is in a file
     quote: tuple[str, int] | None = None  # the line of that, and after how many characters the fault begins
+    compiling: bool = False  # whether it waits for machine code that there was not yet
 
     @property
     def whole(self) -> bool:
@@ -254,6 +255,9 @@ class Renderer:
         start, loaded = looked, backend.loaded()
         plan = make_plan(scene, request.stage, request.size, request.size, method=request.method)
         self.drawing = drawing = replace(drawing, scene=scene, warnings=plan.warnings, path=plan.path_name)
+        if plan.painter and not machine_code.is_kept(plan.painter):
+            self.drawing = replace(drawing, compiling=True)
+            self._changed()
 
         def progress(done: int, total: int, rows: slice) -> None:
             nonlocal looked

@@ -131,6 +131,8 @@ def test_the_status_says_the_method_unless_it_is_the_certain_one():
     other = status(View((FAR,), stage="error", method="half_b"), drawing, SMALLEST)
     assert other.figures == "1 of 1 · error · half_b · 320 × 320 · reading"  # the drawing is not of this method
     assert other.remark == f"half_b: {METHODS['half_b'].about}"
+    waiting = replace(drawing, scene=interpreter(FAR), compiling=True)
+    assert status(View((FAR,), stage="error"), waiting, SMALLEST).figures.endswith("320 × 320 · compiling, once")
 
 
 @pytest.mark.parametrize("method", METHODS)

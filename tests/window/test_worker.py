@@ -14,7 +14,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from raytracer import METHODS, Cancelled, backend, eye_hits, interpreter, plain, render_scene
+from raytracer import METHODS, Cancelled, backend, eye_hits, interpreter, machine_code, plain, render_scene
 from raytracer.render import draw
 from sketch import pace, worker
 from sketch.orbit import HOME, seen_from
@@ -188,6 +188,19 @@ def test_the_kernels_that_are_brought_in_are_used_next(renderer, scene):
     drawing = answer(renderer, Request(scene, "depth", SIZE))
     assert np.array_equal(drawing.picture, render_scene(interpreter(scene), "depth", SIZE, SIZE))
     assert backend.load() is import_module("raytracer.kernels")
+
+
+def test_waiting_for_machine_code_is_told(renderer, scene, monkeypatch):
+    if backend.why_no_compiler():
+        pytest.skip("numba is not installed")
+    backend.load()
+    told = []
+    for kept in (True, False):
+        monkeypatch.setattr(machine_code, "is_kept", lambda kernel, kept=kept: kept)
+        monkeypatch.setattr(renderer, "_changed", lambda: told.append(renderer.drawing.compiling))
+        answer(renderer, Request(scene, "hit" if kept else "outline", SIZE))
+        assert not renderer.drawing.compiling
+        assert any(told) != kept
 
 
 def test_without_a_compiler_nothing_is_brought_in(renderer, scene, monkeypatch):
