@@ -43,6 +43,11 @@ def loaded() -> ModuleType | None:
     return _loaded
 
 
+def is_ready(kernel: str) -> bool:
+    """Whether a kernel has machine code: made by this process, or kept."""
+    return bool(_loaded is not None and getattr(_loaded, kernel).signatures) or machine_code.is_kept(kernel)
+
+
 def choose(tests: int, loops: int, kernel: str = "") -> ModuleType:
     """The path for so many tests of a ray against a shape, in so many loops over rays.
 

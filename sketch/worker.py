@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from raytracer import Cancelled, Scene, backend, interpreter, machine_code, make_plan
+from raytracer import Cancelled, Scene, backend, interpreter, make_plan
 from raytracer.compare import TOLERANCE, Comparison, compare, difference_picture, differences
 from raytracer.course import BLANK
 from raytracer.faults import FileError
@@ -255,7 +255,7 @@ class Renderer:
         start, loaded = looked, backend.loaded()
         plan = make_plan(scene, request.stage, request.size, request.size, method=request.method)
         self.drawing = drawing = replace(drawing, scene=scene, warnings=plan.warnings, path=plan.path_name)
-        if plan.painter and not machine_code.is_kept(plan.painter):
+        if plan.painter and not backend.is_ready(plan.painter):
             self.drawing = replace(drawing, compiling=True)
             self._changed()
 

@@ -196,11 +196,22 @@ def test_waiting_for_machine_code_is_told(renderer, scene, monkeypatch):
     backend.load()
     told = []
     for kept in (True, False):
-        monkeypatch.setattr(machine_code, "is_kept", lambda kernel, kept=kept: kept)
+        monkeypatch.setattr(backend, "is_ready", lambda kernel, kept=kept: kept)
         monkeypatch.setattr(renderer, "_changed", lambda: told.append(renderer.drawing.compiling))
         answer(renderer, Request(scene, "hit" if kept else "outline", SIZE))
         assert not renderer.drawing.compiling
         assert any(told) != kept
+
+
+def test_machine_code_that_cannot_be_kept_is_waited_for_once(renderer, scene, monkeypatch):
+    if backend.why_no_compiler():
+        pytest.skip("numba is not installed")
+    backend.load()
+    monkeypatch.setattr(machine_code, "is_kept", lambda kernel: False)
+    answer(renderer, Request(scene, "hit", SIZE))
+    assert backend.is_ready("paint_flat")
+    monkeypatch.setattr(backend.load(), "paint_flat", SimpleNamespace(signatures=[]))
+    assert not backend.is_ready("paint_flat")
 
 
 def test_without_a_compiler_nothing_is_brought_in(renderer, scene, monkeypatch):
