@@ -256,10 +256,16 @@ class Tile(NamedTuple):
 
 
 class Tiles(NamedTuple):
-    """Tiles that some threads are to paint, each the next that nobody has taken."""
+    """Tiles that some threads are to paint, each the next that nobody has taken.
 
-    next: np.ndarray  # int64 (1,), the number of that one
+    Each thread has a run of its own, and when that is done, it helps with those of others: at one time they write to
+    places far from each other, and at the next picture to the same ones again, which their core may still hold.
+    """
+
+    next: np.ndarray  # int64 (runs,), how many have been taken of each run
+    first: int
     last: int  # excluded
+    own: int  # the run of the thread that asks
 
 
 class Scratch(NamedTuple):
@@ -272,10 +278,51 @@ class Scratch(NamedTuple):
     stack: np.ndarray  # int64 (STACK,), boxes of a tree
     near: np.ndarray  # float64 (STACK,), where rays enter them
     rest: np.ndarray  # uint8 (24,)
+    quick: QuickScratch
+
+
+class QuickScratch(NamedTuple):
+    """What `kernels.quick` writes on while it does a tile, in blocks of 4 × 4 pixels, row by row of blocks."""
+
+    depth: np.ndarray  # float32 (pixels,), k of the nearest hit so far
+    number: np.ndarray  # int32 (pixels,): which of the tile's list that is, counted from 1, 0 for none
+    doubt: np.ndarray  # int32 (blocks,), a bit a pixel
+    table: np.ndarray  # float32, flat: eight numbers for each of the tile's list, for shading; the first row is free
+    batch: np.ndarray  # float32, flat: what is computed of eight spheres at once, for drawing
+    blocks: np.ndarray  # int32, which blocks of a line show anything
+    colour: np.ndarray  # int32, the colours of a line of blocks, red in the lowest byte
+    close: np.ndarray  # int32 (blocks + 1,), the first pixel of blocks that have pixels close to another byte
+    bits: np.ndarray  # int32 (blocks + 1,), a bit for each of those
+    late: np.ndarray  # int64 (1,), how many pixels are to be shaded in float64
+    columns: np.ndarray  # int32: those
+    rows: np.ndarray  # int32
+    spheres: np.ndarray  # int32, what they show
+
+
+class Quick(NamedTuple):
+    """What has to be known of a picture to draw it in single precision: see `quick`."""
+
+    usable: bool
+    u: tuple[float, float, float]  # the camera's axes
+    v: tuple[float, float, float]
+    w: tuple[float, float, float]
+    focus: float  # the focal length in pixels
+    middle_x: float  # the column of the ray (0, 0, −1)
+    middle_y: float  # and the row
+    steep: float  # s of `quick`, at most
+    widest: float  # m for which that is so
+    lights: np.ndarray  # float32, flat, eight numbers each: place in the camera's axes, colour, and its largest channel
+    weight: float  # the sum of those
+    far: float  # what the error of a light's place adds where it is near
+    rounding: float  # what roundings add
+    background: int  # bytes: red, green, blue from the lowest on
+    flat: int
 
 
 class Paints(NamedTuple):
     """What a picture is painted with."""
+
+    quick: Quick
 
     background: np.ndarray  # float64 (3,), from 0 to 255
     flat: np.ndarray  # float64 (3,), likewise: the one colour of a stage that has but one

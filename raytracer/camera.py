@@ -34,6 +34,7 @@ _BAND_TESTS = 1 << 22
 BAND_PIXELS = 1 << 15  # enough to outweigh what a task costs, few enough to stay in a core's cache
 
 Vectors = tuple[np.ndarray, np.ndarray, np.ndarray]
+Three = tuple[float, float, float]
 
 _PI = Decimal("3.14159265358979323846264338327950288419716939937510582097494459230781640628620899862803482534211706798")
 _DIGITS = 80
@@ -214,16 +215,37 @@ def fine_rows(raster: Raster) -> tuple[Twofold, Twofold, Twofold]:
 
 def twofold_eye_rays(raster: Raster, xs: np.ndarray, ys: np.ndarray) -> TwofoldRays:
     """The rays of single pixels, columns xs and rows ys, arrays of shape (n,)."""
-    across, up = (_ratio(n.astype(float), float(raster.whole_height)) for n in raster.numerators(xs, ys))
-    back = focal_length(raster.camera.fov)
+    return TwofoldRays._make(fine_ray(*factors_of(raster, xs, ys)))
+
+
+def factors_of(raster: Raster, xs: np.ndarray, ys: np.ndarray) -> tuple[Number, ...]:
+    """What `fine_ray` makes a ray of, for single pixels."""
+    across, up = (n.astype(float) for n in raster.numerators(xs, ys))
     camera = raster.camera
-    components, sizes = [], []
-    for u, v, w in zip(camera.u, camera.v, camera.w, strict=True):
-        component = add(*multiply(*across, u, 0.0), *multiply(*up, v, 0.0))
-        components.append(add(*component, *two_product(-back, w)))
-        sizes.append(np.abs(across[0] * u) + np.abs(up[0] * v) + abs(back * w))
-    highs, lows = zip(*components, strict=True)
-    return TwofoldRays._make([*highs, *lows, in_range(np.sqrt(_square(*sizes)))])
+    return across, up, float(raster.whole_height), camera.u, camera.v, camera.w, focal_length(camera.fov)
+
+
+def fine_ray(
+    across: Number, up: Number, height: float, u: Three, v: Three, w: Three, back: float
+) -> tuple[Number, Number, Number, Number, Number, Number, Number]:
+    """A ray in two-fold float64, as `TwofoldRays` has it, from H·U, H·V, H, the camera's frame and d."""
+    fine_across, fine_up = _ratio(across, height), _ratio(up, height)
+    x, x_low, width = _fine_component(fine_across, fine_up, u[0], v[0], w[0], back)
+    y, y_low, depth = _fine_component(fine_across, fine_up, u[1], v[1], w[1], back)
+    z, z_low, size = _fine_component(fine_across, fine_up, u[2], v[2], w[2], back)
+    return x, y, z, x_low, y_low, z_low, in_range(np.sqrt(_square(width, depth, size)))
+
+
+def _fine_component(
+    across: Twofold, up: Twofold, u: float, v: float, w: float, back: float
+) -> tuple[Number, Number, Number]:
+    """One component, and the sum of its terms' sizes."""
+    x, x_low = multiply(across[0], across[1], u, 0.0)
+    y, y_low = multiply(up[0], up[1], v, 0.0)
+    z, z_low = two_product(-back, w)
+    x, x_low = add(x, x_low, y, y_low)
+    x, x_low = add(x, x_low, z, z_low)
+    return x, x_low, abs(across[0] * u) + abs(up[0] * v) + abs(back * w)
 
 
 def given_rays(directions: np.ndarray) -> Rays:

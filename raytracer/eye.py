@@ -13,7 +13,7 @@ import numpy as np
 from raytracer import backend, plain
 from raytracer.arrays import Balls, Candidates, Facets, First, Grid, Hits, Seen
 from raytracer.boxes import Lens, facet_boxes, make_lens
-from raytracer.camera import Raster, eye_grid, fine_columns, fine_rows, rows_of, spread, squares, twofold_eye_rays
+from raytracer.camera import Raster, eye_grid, factors_of, fine_columns, fine_rows, rows_of, spread, squares
 from raytracer.certified import LARGEST_SPREAD, fine_direction, refine
 from raytracer.facets import see_facets
 from raytracer.methods import CERTIFIED, Method
@@ -144,10 +144,10 @@ class PixelsOf(NamedTuple):
         return candidates_of(self.boxes, which[1], which[0] + self.first_row)
 
 
-def bundle_of(raster: Raster, origin: np.ndarray, xs: np.ndarray, ys: np.ndarray) -> Bundle:
+def bundle_of(raster: Raster, origin: np.ndarray, xs: np.ndarray, ys: np.ndarray, path: ModuleType = plain) -> Bundle:
     """The rays of single pixels, columns xs and rows ys."""
     origins = np.repeat(origin[None], len(xs), axis=0)
-    rays = twofold_eye_rays(raster, xs, ys)
+    rays = path.fine_rays(*factors_of(raster, xs, ys))
     return Bundle(origins, rays, lambda k: raster.whole_direction(int(xs[k]), int(ys[k])), True)
 
 

@@ -24,7 +24,7 @@ from raytracer.arrays import (
     View,
 )
 from raytracer.boxes import Lens, beside, box_of
-from raytracer.camera import squares
+from raytracer.camera import fine_ray, squares
 from raytracer.certified import (
     K_ERROR,
     Three,
@@ -141,6 +141,13 @@ def refine_given(
     t[which] = np.where(sure, finer, t[which])
     open_rays: np.ndarray = which[~sure]
     return open_rays
+
+
+def fine_rays(
+    across: np.ndarray, up: np.ndarray, height: float, u: Three, v: Three, w: Three, back: float
+) -> TwofoldRays:
+    """`camera.fine_ray` of many rays."""
+    return TwofoldRays._make(fine_ray(across, up, height, u, v, w, back))
 
 
 def nearest_twofold(

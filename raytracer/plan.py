@@ -25,7 +25,8 @@ from raytracer.units import scene_units
 _REFLECTIONS = 4  # that follow each other where there are mirrors, about
 _TESTS_FOR_ONE = 8  # tests of rays that start on a shape, many together, in the time of one of an eye ray
 _LEAST, _MOST = 1e-70, 1e70  # lengths whose squares, and products of four, are numbers that float64 holds in full
-_TESTS_A_LIGHT = 20  # what shading by a light costs, in tests of a ray against a sphere
+_QUICK = "paint_flat", "paint_diffuse", "paint_diffuse_any"  # painters that begin with single precision
+_TESTS_A_LIGHT = 6  # what shading by a light costs, in tests of a ray against a sphere
 
 
 @dataclass(frozen=True, eq=False)
@@ -243,7 +244,8 @@ def _reasons_for_tracing(plan: Plan) -> Iterator[str]:
     if on := int((eye.targets.sides.c == 0).sum()):
         yield f"the eye lies exactly on {_count(range(on), 'sphere')}: the hit at t = 0 does not count"
     if plan.method == CERTIFIED:
-        yield "every decision certain: float64, where that cannot tell two-fold float64, then integers"
+        first = "single precision with a bound of its error, then " if plan.painter in _QUICK else ""
+        yield f"every decision certain: {first}float64, where that cannot tell two-fold float64, then integers"
     else:
         name = f"{plan.method}: " if isinstance(plan.method, str) else ""
         yield f"method {name}{row_of(plan.method).about}; what rounding makes of it is what is drawn"

@@ -185,14 +185,14 @@ class Easel:
 
     def _decide(self, doubtful: Pixels, worker: int) -> None:
         hits, places = doubtful.hits(), (doubtful.ys - self.first_row, doubtful.xs)
-        if isinstance(self.paints, FullPaints):
+        plan, found = self.plan, self.screen.in_scene(hits)
+        if kernel := plan.stage.colours_of:
             self.picture[places] = self.paints.background
             some = hits.index >= 0
             pixels = doubtful._replace(xs=doubtful.xs[some], ys=doubtful.ys[some])
-            colours = self.screen.radiance(pixels, Hits(hits.t[some], hits.index[some]), self.paints, worker)
+            colours = self.screen.colours(kernel, pixels, Hits(hits.t[some], hits.index[some]), self.paints, worker)
             self.picture[places[0][some], places[1][some]] = to_bytes(colours)
             return
-        plan, found = self.plan, self.screen.in_scene(hits)
         block = Block(plan.scene, plan.raster, doubtful.ys, found, plan.lights, doubtful.xs)
         self.picture[places] = colours_of(plan, block)
 

@@ -33,14 +33,14 @@ from raytracer.render import (
     open_tracer,
     share_pieces,
 )
-from raytracer.screen import Screen
+from raytracer.screen import ALL, Screen
 from raytracer.stages import Block, Stage
 
 ADAPTIVE = "adaptive"
 SAMPLES = (1, 4, 16, 64, 256, ADAPTIVE)
 SIDE = 8  # of the block of samples of a pixel, where `adaptive` takes more than one
 DIFFERS = 16  # of 255 by which neighbours differ that are looked at more closely
-_TILE = 64  # pixels of the large picture, along a tile's edge
+_TILE_WIDTH, _TILE_HEIGHT = 128, 32  # pixels of the large picture
 _PAINTED = 32  # pixels that a kernel paints in the memory of one that numpy is at work on
 
 Samples = int | str
@@ -75,7 +75,7 @@ def draw_samples(
     raster, side = plan.raster, SIDE if samples == ADAPTIVE else isqrt(int(samples))
     size = raster.height, raster.width, 3
     fine = replace(plan, raster=raster.finer(side))
-    strip = min(_TILE, fine.raster.height) * fine.raster.width
+    strip = min(_TILE_HEIGHT, fine.raster.height) * fine.raster.width
     check_fits_memory(raster.width, raster.height, max(strip // _PAINTED if fine.painter else strip, BAND_PIXELS))
     if samples == ADAPTIVE:
         picture = draw(plan, threads=threads, out=out, cancelled=cancelled)
@@ -89,7 +89,7 @@ def draw_samples(
 
 def _draw_means(fine: Plan, side: int, wanted: np.ndarray, picture: np.ndarray, watch: Watch) -> None:
     """Draw the large picture, a strip at a time, and put the means of its blocks where they are wanted."""
-    height = _TILE // side
+    height = _TILE_HEIGHT // side
     strips = [slice(row, min(row + height, len(wanted))) for row in range(0, len(wanted), height)]
     with open_tracer(fine, watch.threads) as tracer:
         easel = make_easel(fine, tracer, picture) if fine.painter and isinstance(tracer, Screen) else None
@@ -126,11 +126,12 @@ def _draw_strip(
             picture[ys[few], xs[few]] = _means(fine, large_rows, hits, side, ys[few], xs[few])
         return
     kernels = easel.screen.kernels
-    assert kernels.TILE_WIDTH == kernels.TILE_HEIGHT == _TILE
+    assert (kernels.TILE_WIDTH, kernels.TILE_HEIGHT) == (_TILE_WIDTH, _TILE_HEIGHT)
     large = np.empty((large_rows.stop - large_rows.start, fine.raster.width, 3), np.uint8)
     eights = _any_of(wanted.repeat(side, axis=1), 8)
-    part = easel.on(large, large_rows.start, eights.repeat(side, axis=0).astype(np.uint8))
-    for run in _runs(np.asarray(_any_of(eights, _TILE // 8).any(axis=0))):
+    some = ALL if wanted.all() else eights.repeat(side, axis=0).astype(np.uint8)
+    part = easel.on(large, large_rows.start, some)
+    for run in _runs(np.asarray(_any_of(eights, _TILE_WIDTH // 8).any(axis=0))):
         part.paint(easel.screen.tiles_of(large_rows, run), worker)
     part.finish(worker)
     kernels.mean_of_blocks(large, side, wanted, picture)

@@ -150,6 +150,12 @@ class Materials(_Table[Material]):
         rows[:, :3] = self.table[:, :3]
         return rows
 
+    @cached_property
+    def diffuse_range(self) -> tuple[float, float]:
+        """The smallest and the largest number among the diffuse colours; 0 if there is none."""
+        colours = self.table[:, :3]
+        return (float(colours.min()), float(colours.max())) if len(colours) else (0.0, 0.0)
+
     def _row(self, i: int) -> Material:
         row = self.table[i]
         return Material(vector(row[0:3]), vector(row[3:6]), vector(row[6:9]), float(row[9]), float(row[10]))

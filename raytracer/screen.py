@@ -36,6 +36,8 @@ from raytracer.arrays import (
     Hits,
     Mirrors,
     Paints,
+    Quick,
+    QuickScratch,
     Scratch,
     Seen,
     Sides,
@@ -53,6 +55,7 @@ from raytracer.lookup import light_cells, reach_of, tree_of
 from raytracer.mirrors import NO_MIRRORS, see_mirrors
 from raytracer.plan import Plan
 from raytracer.pool import cores, share
+from raytracer.quick import make_quick
 from raytracer.scene import Camera, Colour, Light, Materials, Scene, Triangles
 from raytracer.settle import Bundle, Index, Targets, known_in_integers, polish, settled
 from raytracer.shading import to_byte
@@ -62,7 +65,7 @@ from raytracer.units import scene_units
 SPARE = 8  # elements at the end of arrays that are read eight at a time
 _SPARE = 32  # list entries beyond the last that a kernel may look at
 _DOUBTS = 1 << 15  # pixels that a thread lists before they are decided
-_FEW = 1 << 13  # spheres below which one thread sorts them sooner than two
+_FEW = 1 << 15  # spheres below which one thread sorts them sooner than two
 _MOST_WORKERS = 8  # that sort: each counts all tiles anew
 _BAND_PIXELS = 1 << 18  # of a numpy stage's block
 _PIXELS_A_MOMENT, _SPHERES_A_MOMENT = 1 << 21, 1 << 15  # what is drawn in two milliseconds or so
@@ -152,7 +155,7 @@ class Screen(NamedTuple):
         height, across = self.kernels.TILE_HEIGHT, self.bins.columns
         first, count = rows.start // height * across, -(-(rows.stop - rows.start) // height) * across
         start, stop, _ = columns.indices(count)
-        return Tiles(np.array([first + start]), first + stop)
+        return Tiles(np.zeros(len(self.desks), np.int64), first + start, first + stop, 0)
 
     def hits(self, rows: slice, worker: int = 0, polished: bool = False) -> Hits:
         """What the rays of these rows, cut between tiles, hit first: as `Eye.hits`."""
@@ -223,25 +226,18 @@ class Screen(NamedTuple):
         What is left of them `doubtful` tells.
         """
         kernel, (scratch, doubts) = getattr(self.kernels, painter), self.desks[worker]
+        tiles = tiles._replace(own=worker % len(tiles.next))
         while not kernel(self.view, self.slow, self.bins, tiles, scratch, doubts, paints, out):
             yield from self.doubtful(worker)
 
-    def radiance(self, pixels: Pixels, hits: Hits, paints: FullPaints, worker: int) -> np.ndarray:
-        """The colours of the stage `full` for some pixels that hit something: float64 (n, 3)."""
+    def colours(self, kernel: str, pixels: Pixels, hits: Hits, paints: Paints | FullPaints, worker: int) -> np.ndarray:
+        """The colours of some pixels that hit something: float64 (n, 3)."""
         count = len(pixels.xs)
         eights = [np.resize(array, -(-count // SPARE) * SPARE) for array in (*hits, pixels.xs, pixels.ys)]
         t, index, columns, rows = eights
-        colours = np.empty((len(t), 3))
-        self.kernels.radiance_of(
-            self.view,
-            paints,
-            t,
-            index,
-            columns.astype(np.int32),
-            rows.astype(np.int32),
-            self.desks[worker].scratch,
-            colours,
-        )
+        colours, scratch = np.empty((len(t), 3)), self.desks[worker].scratch
+        pixel = columns.astype(np.int32), rows.astype(np.int32)
+        getattr(self.kernels, kernel)(self.view, paints, t, index, *pixel, scratch, colours)
         return colours[:count]
 
     def doubtful(self, *workers: int) -> Iterator[Pixels]:
@@ -273,7 +269,8 @@ class Pixels(NamedTuple):
         hits.t[where], hits.index[where] = self.hits()
 
     def bundle(self, which: Index) -> Bundle:
-        return bundle_of(self.screen.raster, self.screen.origin, self.xs[which], self.ys[which])
+        screen = self.screen
+        return bundle_of(screen.raster, screen.origin, self.xs[which], self.ys[which], screen.kernels)
 
     def candidates(self, which: Index) -> Candidates:
         screen = self.screen
@@ -308,7 +305,12 @@ def make_paints(plan: Plan, screen: Screen) -> Paints:
     """What the plan's stage is painted with."""
     flat, background = plan.stage.flat(plan.scene)
     lights = _lights_from_eye(plan.lights, plan.scene.camera, screen.unit)
-    return Paints(_bytes_of(background), _bytes_of(flat), lights, plan.scene.materials.diffuse.reshape(-1))
+    diffuse = plan.scene.materials.diffuse
+    colours = _bytes_of(background), _bytes_of(flat)
+    quick = make_quick(
+        plan.raster, plan.lights, screen.unit, plan.scene.materials.diffuse_range, *(tuple(c.tolist()) for c in colours)
+    )
+    return Paints(quick, *colours, lights, diffuse.reshape(-1))
 
 
 @lru_cache(maxsize=8)
@@ -340,7 +342,11 @@ def _glass(scene: Scene, screen: Screen) -> Mirrors:
     )
 
 
-_NO_PAINTS = Paints(np.zeros(3), np.zeros(3), np.empty((0, 6)), Materials().diffuse.reshape(-1))
+_AXIS = 0.0, 0.0, 0.0
+_NO_QUICK = Quick(
+    False, _AXIS, _AXIS, _AXIS, 1.0, 0.0, 0.0, 0.0, 0.0, np.empty(0, np.float32), 0.0, 0.0, 0.0, 0, 0
+)  # fmt: skip
+_NO_PAINTS = Paints(_NO_QUICK, np.zeros(3), np.zeros(3), np.empty((0, 6)), Materials().diffuse.reshape(-1))
 
 
 _NO_SPHERES = np.empty(0)
@@ -385,8 +391,33 @@ def _new_desk(workspace: Workspace, kernels: ModuleType, worker: int) -> Desk:
         array(_STACK, np.int64, "stack", worker),
         array(_STACK, np.float64, "near", worker),
         array(32, np.uint8, "rest", worker),
+        _quick_scratch(workspace, kernels, worker),
     )
     return Desk(scratch, array(_DOUBTS, np.int64, "doubts", worker))
+
+
+def _quick_scratch(workspace: Workspace, kernels: ModuleType, worker: int) -> QuickScratch:
+    pixels, blocks = kernels.TILE_HEIGHT * kernels.TILE_WIDTH, kernels.TILE_HEIGHT * kernels.TILE_WIDTH // 16
+    line, late = 4 * kernels.TILE_WIDTH, 2 * pixels
+
+    def array(size: int, kind: type, name: str) -> np.ndarray:
+        return workspace.zeros(size, kind, f"quick {name}", worker)
+
+    return QuickScratch(
+        depth=array(pixels, np.float32, "depth"),
+        number=array(pixels, np.int32, "number"),
+        doubt=array(blocks, np.int32, "doubt"),
+        table=array(8 * (kernels.MOST + 16), np.float32, "table"),
+        batch=array(160, np.float32, "batch"),
+        blocks=array(line, np.int32, "blocks"),
+        colour=array(line, np.int32, "colour"),
+        close=array(blocks + 2, np.int32, "close"),
+        bits=array(blocks + 2, np.int32, "bits"),
+        late=array(1, np.int64, "late"),
+        columns=array(late, np.int32, "columns"),
+        rows=array(late, np.int32, "rows"),
+        spheres=array(late, np.int32, "spheres"),
+    )
 
 
 def _view(raster: Raster, origin: np.ndarray, balls: np.ndarray, material: np.ndarray) -> View:

@@ -376,6 +376,7 @@ class Stage:
     needs_tests: bool = False  # counts how many spheres a pixel is tested against
     legend: tuple[tuple[tuple[float, float, float], str], ...] = ()  # what its colours mean
     painter: str = ""  # a kernel that paints the same bytes, of tiles or, if it needs them, of the whole picture's hits
+    colours_of: str = ""  # a kernel that works out the colours of single hits
     flat: Callable[[Scene], tuple[Colour, Colour]] = background  # what it paints: the one colour of hits, the rest
 
 
@@ -389,11 +390,11 @@ STAGES = {
     ),
     "diffuse": Stage(
         "d", diffuse, "the light that a matt surface throws back", needs_normals=True, needs_lights=True,
-        painter="paint_diffuse",
+        painter="paint_diffuse", colours_of="diffuse_of",
     ),
     "full": Stage(
         "f", full, "all light: ambient, diffuse, specular, with shadows and mirrors", needs_normals=True,
-        needs_lights=True, throws_on=True, painter="paint_full",
+        needs_lights=True, throws_on=True, painter="paint_full", colours_of="radiance_of",
     ),
     "normal": Stage(
         "n", normal, "the normal (x, y, z) as red, green, blue: −1 is 0, 1 is full", needs_normals=True,

@@ -71,7 +71,7 @@ def test_the_picture_does_not_depend_on_threads():
 def test_doubts_that_do_not_fit_their_list_are_decided_on_the_way(monkeypatch):
     scene = interpreter("scenes/hard/08_tied_spheres.cli")
     expected = eye_hits(scene, 200, 200)
-    monkeypatch.setattr(screen, "_DOUBTS", KERNELS.TILE_WIDTH * KERNELS.TILE_HEIGHT + 2)
+    monkeypatch.setattr(screen, "_DOUBTS", KERNELS.ROOM + 2)
     monkeypatch.setattr(screen, "_idle", screen.LifoQueue(2))
     found = eye_hits(scene, 200, 200)
     np.testing.assert_array_equal(found.index, expected.index)

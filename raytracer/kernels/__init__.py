@@ -8,8 +8,11 @@ with cache_named_after_sources():
     from raytracer.kernels.cells import bound_images, sort_into_cells
     from raytracer.kernels.facets import see_facets
     from raytracer.kernels.full import radiance_of
+    from raytracer.kernels.quick import MOST
     from raytracer.kernels.reading import read_plain
+    from raytracer.kernels.surfaces import diffuse_of
     from raytracer.kernels.tiles import (
+        ROOM,
         find_fine_hits,
         find_hits,
         paint_diffuse,
@@ -19,12 +22,14 @@ with cache_named_after_sources():
         paint_full,
         paint_normal,
     )
-    from raytracer.kernels.trace import nearest_given, nearest_twofold, polish, refine_given
+    from raytracer.kernels.trace import fine_rays, nearest_given, nearest_twofold, polish, refine_given
     from raytracer.kernels.usual import usual_eye, usual_given
     from raytracer.kernels.visibility import STRIDE, candidates
     from raytracer.kernels.whole import mean_of_blocks, paint_depth, paint_edges, range_of
 
 __all__ = [
+    "MOST",
+    "ROOM",
     "STRIDE",
     "TILE_HEIGHT",
     "TILE_WIDTH",
@@ -36,10 +41,12 @@ __all__ = [
     "candidates",
     "candidates_in_tree",
     "count",
+    "diffuse_of",
     "enclose",
     "fill",
     "find_fine_hits",
     "find_hits",
+    "fine_rays",
     "mean_of_blocks",
     "nearest_given",
     "nearest_in_tree",

@@ -18,7 +18,7 @@ from raytracer.kernels.compiler import borrowing, inlined
 from raytracer.kernels.lanes import WIDTH, all_of, load_rows, store_boxes
 from raytracer.twofold import select
 
-_WIDE, _HIGH = 6, 6
+_WIDE, _HIGH = 7, 5
 TILE_WIDTH, TILE_HEIGHT = 1 << _WIDE, 1 << _HIGH  # pixels: a tile's depth buffer fits a core's first cache
 _SLOW = -1.0
 

@@ -19,13 +19,13 @@ import numba
 from llvmlite.binding import get_host_cpu_features
 from numba.extending import overload, register_jitable
 
-from raytracer import bounce, boxes, certified, facets, machine_code, methods, shading, twofold
-from raytracer.kernels.lanes import Mask, blend, fused
+from raytracer import bounce, boxes, camera, certified, facets, machine_code, methods, quick, shading, twofold
+from raytracer.kernels.lanes import MarkPairs, Marks, Mask, blend, fused
 
 
 @overload(twofold.select)
 def _select(condition, yes, no):
-    if isinstance(condition, Mask):
+    if isinstance(condition, (Mask, Marks, MarkPairs)):
         return lambda condition, yes, no: blend(condition, yes, no)
     return lambda condition, yes, no: yes if condition else no
 
@@ -59,7 +59,7 @@ def _compile_calls_into(module: ModuleType) -> None:
             register_jitable(function)
 
 
-_SOURCES = (twofold, certified, boxes, facets, shading, bounce, methods)
+_SOURCES = (twofold, certified, camera, boxes, facets, shading, bounce, methods, quick)
 _OVERLOADED = (twofold.select, twofold.exponent, twofold.scale)
 if get_host_cpu_features().get("fma"):
     _OVERLOADED += (twofold.two_product,)

@@ -27,7 +27,7 @@ from raytracer.bounce import (
 )
 from raytracer.certified import inner
 from raytracer.kernels.cells import spot_of
-from raytracer.kernels.compiler import borrowing, inlined
+from raytracer.kernels.compiler import inlined, variant
 from raytracer.kernels.lanes import (
     WIDTH,
     all_of,
@@ -48,6 +48,7 @@ from raytracer.kernels.lanes import (
     store,
     whole,
 )
+from raytracer.kernels.surfaces import colours_of_hits
 from raytracer.shading import cosine, highlight, land_on_any, land_on_plane, raised_to_whole, towards, unit_of
 from raytracer.twofold import select
 
@@ -339,21 +340,9 @@ def _row(table, row):
     return table[row], table[row + np.uint64(1)], table[row + np.uint64(2)], table[row + np.uint64(3)]
 
 
-@borrowing
-def radiance_of(view, paints, t, index, columns, rows, scratch, colours):
-    """The colours of single hits, float64 (n, 3): t, index and pixels are arrays of whole eights."""
-    u, v, back, everywhere = view.u, view.v, view.back, spread(0.0) == 0.0
-    for k in range(np.uint64(0), np.uint64(len(t)), np.uint64(WIDTH)):
-        across, up = gather(view.across, load(columns, k)), gather(view.up, load(rows, k))
-        d = (
-            across * u[0] + (up * v[0] - back[0]),
-            across * u[1] + (up * v[1] - back[1]),
-            across * u[2] + (up * v[2] - back[2]),
-        )
-        red, green, blue = radiance(view, paints, load(t, k), d, load(index, k), everywhere, 0, -1, scratch)
-        store(scratch.batch, 0, red)
-        store(scratch.batch, WIDTH, green)
-        store(scratch.batch, 2 * WIDTH, blue)
-        for lane in range(WIDTH):
-            for colour in range(3):
-                colours[k + np.uint64(lane), colour] = scratch.batch[WIDTH * colour + lane]
+@inlined
+def _radiance_at(view, paints, d, t, columns, index, scratch):
+    return radiance(view, paints, t, d, index, spread(0.0) == 0.0, 0, -1, scratch)
+
+
+radiance_of = variant(colours_of_hits, "radiance_of", colours=_radiance_at)

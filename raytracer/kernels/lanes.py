@@ -1,4 +1,4 @@
-"""Eight numbers as one value: what a processor computes at once.
+"""Eight numbers as one value, or sixteen of half the length: what a processor computes at once.
 
 A kernel that is written with lanes in place of numbers runs for eight pixels, spheres or rays in one go, on whatever
 vectors the processor has. The compiler vectorises plain loops too, but not those with a branch, a slice or many arrays,
@@ -7,6 +7,9 @@ and it does not say when it gives up. The formulas of `certified`, plain arithme
     Lanes    <8 x double>   + − × ÷, −x, abs, sqrt, floor, ceil, comparisons; a number beside lanes counts eight times
     Mask     <8 x i1>       & | ~; any_of, all_of, bits_of; `select(mask, lanes, lanes)`
     Places   <8 x i32>      eight int32
+    Singles  <16 x float>   + − ×, −x, abs, comparisons; see `sixteen`
+    Marks    <16 x i1>      as a mask
+    Numbers  <16 x i32>     + & | << >>, comparisons
 
 Arrays are one-dimensional and contiguous; nothing checks their ends.
 """
@@ -20,54 +23,93 @@ from numba.core.cgutils import get_or_insert_function
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import intrinsic, lower_builtin, lower_cast, models, register_model
 
-WIDTH = 8
+WIDTH, SIXTEEN = 8, 16
 
-_DOUBLE, _INT32, _BYTE, _BIT = ir.DoubleType(), ir.IntType(32), ir.IntType(8), ir.IntType(1)
+_DOUBLE, _FLOAT, _INT32, _BYTE, _BIT = ir.DoubleType(), ir.FloatType(), ir.IntType(32), ir.IntType(8), ir.IntType(1)
 _FOUR = 4  # numbers of a row of a table
 
 
 class Lanes(types.Type):
-    element = _DOUBLE
+    vector, single = ir.VectorType(_DOUBLE, WIDTH), types.float64
 
 
 class Mask(types.Type):
-    element = _BIT
+    vector, single = ir.VectorType(_BIT, WIDTH), types.boolean
 
 
 class Places(types.Type):
-    element = _INT32
+    vector, single = ir.VectorType(_INT32, WIDTH), types.int32
+
+
+class Singles(types.Type):
+    vector, single = ir.VectorType(_FLOAT, SIXTEEN), types.float32
+
+
+class Marks(types.Type):
+    vector, single = ir.VectorType(_BIT, SIXTEEN), types.boolean
+
+
+class Numbers(types.Type):
+    vector, single = ir.VectorType(_INT32, SIXTEEN), types.int32
+
+
+class SinglePairs(types.Type):
+    vector, single = ir.VectorType(_FLOAT, 2 * SIXTEEN), types.float32
+
+
+class MarkPairs(types.Type):
+    vector, single = ir.VectorType(_BIT, 2 * SIXTEEN), types.boolean
+
+
+class NumberPairs(types.Type):
+    vector, single = ir.VectorType(_INT32, 2 * SIXTEEN), types.int32
 
 
 LANES, MASK, PLACES = Lanes("lanes"), Mask("mask"), Places("places")
+SINGLES, MARKS, NUMBERS = Singles("singles"), Marks("marks"), Numbers("numbers")
+SINGLE_PAIRS, MARK_PAIRS, NUMBER_PAIRS = (
+    SinglePairs("single pairs"),
+    MarkPairs("mark pairs"),
+    NumberPairs("number pairs"),
+)
+_MASK_OF = {
+    LANES: MASK, PLACES: MASK, MASK: MASK, SINGLES: MARKS, NUMBERS: MARKS, SINGLE_PAIRS: MARK_PAIRS,
+    NUMBER_PAIRS: MARK_PAIRS,
+}  # fmt: skip
+FLOATS, INTEGERS = (LANES, SINGLES, SINGLE_PAIRS), (NUMBERS, NUMBER_PAIRS)
 
 
 @register_model(Lanes)
 @register_model(Mask)
 @register_model(Places)
+@register_model(Singles)
+@register_model(Marks)
+@register_model(Numbers)
+@register_model(SinglePairs)
+@register_model(MarkPairs)
+@register_model(NumberPairs)
 class _Vector(models.PrimitiveModel):
     def __init__(self, manager, kind):
-        super().__init__(manager, kind, ir.VectorType(kind.element, WIDTH))
+        super().__init__(manager, kind, kind.vector)
 
 
 @lower_cast(types.Number, Lanes)
-def _eight_numbers(context, builder, number, lanes, value):
-    return _spread(builder, context.cast(builder, value, number, types.float64))
-
-
 @lower_cast(types.Integer, Places)
-def _eight_places(context, builder, number, places, value):
-    return _spread(builder, context.cast(builder, value, number, types.int32))
-
-
 @lower_cast(types.Boolean, Mask)
-def _eight_bits(context, builder, boolean, mask, value):
-    return _spread(builder, value)
+@lower_cast(types.Number, Singles)
+@lower_cast(types.Integer, Numbers)
+@lower_cast(types.Boolean, Marks)
+@lower_cast(types.Number, SinglePairs)
+@lower_cast(types.Integer, NumberPairs)
+@lower_cast(types.Boolean, MarkPairs)
+def _many(context, builder, number, kind, value):
+    return _spread(builder, context.cast(builder, value, number, kind.single), kind.vector.count)
 
 
-def _spread(builder, value):
-    vector = ir.VectorType(value.type, WIDTH)
+def _spread(builder, value, width=WIDTH):
+    vector = ir.VectorType(value.type, width)
     first = builder.insert_element(ir.Constant(vector, ir.Undefined), value, ir.Constant(_INT32, 0))
-    return builder.shuffle_vector(first, first, _order([0] * WIDTH))
+    return builder.shuffle_vector(first, first, _order([0] * width))
 
 
 def _order(numbers):
@@ -79,7 +121,7 @@ def _order(numbers):
 
 def _operator(symbol, operand, result, count, lower):
     """Let a symbol take so many operands, of which one at least is a vector and the rest may be single values."""
-    vector, single = type(operand), types.Number if operand is LANES else types.Boolean
+    vector, single = type(operand), types.Boolean if operand.single is types.boolean else types.Number
 
     @infer_global(symbol)
     class Operator(AbstractTemplate):
@@ -92,17 +134,27 @@ def _operator(symbol, operand, result, count, lower):
 
 
 def _instruction(name):
-    """The call of an LLVM intrinsic whose operands and result are lanes."""
+    """The call of an LLVM intrinsic whose operands and result are lanes or singles."""
 
     def lower(builder, *args):
         kind = ir.FunctionType(args[0].type, [arg.type for arg in args])
-        return builder.call(get_or_insert_function(builder.module, kind, f"{name}.v{WIDTH}f64"), args)
+        return builder.call(get_or_insert_function(builder.module, kind, name + _suffix(args[0].type)), args)
 
     return lower
 
 
+def _suffix(kind):
+    """What LLVM calls a type in the names of intrinsics."""
+    width = f"v{kind.count}" if isinstance(kind, ir.VectorType) else ""
+    return f".{width}f{32 if getattr(kind, 'element', kind) == _FLOAT else 64}"
+
+
 def _comparison(sign):
     return lambda builder, a, b: builder.fcmp_ordered(sign, a, b)
+
+
+def _comparison_of_numbers(sign):
+    return lambda builder, a, b: builder.icmp_signed(sign, a, b)
 
 
 for _symbol, _lower in (
@@ -111,10 +163,15 @@ for _symbol, _lower in (
     (operator.mul, ir.IRBuilder.fmul),
     (operator.truediv, ir.IRBuilder.fdiv),
 ):
-    _operator(_symbol, LANES, LANES, 2, _lower)
+    for _kind in FLOATS:
+        _operator(_symbol, _kind, _kind, 2, _lower)
 for _symbol, _lower in (
     (operator.neg, ir.IRBuilder.fneg),
     (abs, _instruction("llvm.fabs")),
+):
+    for _kind in FLOATS:
+        _operator(_symbol, _kind, _kind, 1, _lower)
+for _symbol, _lower in (
     (np.sqrt, _instruction("llvm.sqrt")),
     (np.floor, _instruction("llvm.floor")),
     (np.ceil, _instruction("llvm.ceil")),
@@ -127,44 +184,52 @@ for _symbol, _sign in (
     (operator.ge, ">="),
     (operator.eq, "=="),
 ):
-    _operator(_symbol, LANES, MASK, 2, _comparison(_sign))
+    for _kind in FLOATS:
+        _operator(_symbol, _kind, _MASK_OF[_kind], 2, _comparison(_sign))
+    for _kind in INTEGERS:
+        _operator(_symbol, _kind, _MASK_OF[_kind], 2, _comparison_of_numbers(_sign))
 _operator(operator.add, PLACES, PLACES, 2, ir.IRBuilder.add)
 _operator(operator.mul, PLACES, PLACES, 2, ir.IRBuilder.mul)
-_operator(operator.and_, MASK, MASK, 2, ir.IRBuilder.and_)
-_operator(operator.or_, MASK, MASK, 2, ir.IRBuilder.or_)
-_operator(operator.invert, MASK, MASK, 1, ir.IRBuilder.not_)
+for _symbol, _lower in (
+    (operator.add, ir.IRBuilder.add),
+    (operator.and_, ir.IRBuilder.and_),
+    (operator.or_, ir.IRBuilder.or_),
+    (operator.lshift, ir.IRBuilder.shl),
+    (operator.rshift, ir.IRBuilder.lshr),
+):
+    for _kind in INTEGERS:
+        _operator(_symbol, _kind, _kind, 2, _lower)
+for _mask in (MASK, MARKS, MARK_PAIRS):
+    _operator(operator.and_, _mask, _mask, 2, ir.IRBuilder.and_)
+    _operator(operator.or_, _mask, _mask, 2, ir.IRBuilder.or_)
+    _operator(operator.invert, _mask, _mask, 1, ir.IRBuilder.not_)
 
 
 @intrinsic
 def blend(typing, mask, yes, no):
     """In each lane `yes` or `no`, of which one may be a number."""
-    kind = next((arg for arg in (yes, no) if isinstance(arg, (Lanes, Mask, Places))), LANES)
-    return kind(mask, kind, kind), lambda context, builder, sig, args: builder.select(*args)
+    usual = next(kind for kind in FLOATS if _MASK_OF[kind] == mask)
+    kind = next((arg for arg in (yes, no) if arg in _MASK_OF), usual)
+    return kind(_MASK_OF[kind], kind, kind), lambda context, builder, sig, args: builder.select(*args)
 
 
 @intrinsic
 def fused(typing, a, b, c):
-    """a · b + c, rounded once, of lanes or of numbers."""
-    kind = next((arg for arg in (a, b, c) if isinstance(arg, Lanes)), types.float64)
-
-    def lower(context, builder, sig, args):
-        suffix = f"v{WIDTH}f64" if kind is LANES else "f64"
-        function = ir.FunctionType(args[0].type, [arg.type for arg in args])
-        return builder.call(get_or_insert_function(builder.module, function, f"llvm.fma.{suffix}"), args)
-
-    return kind(kind, kind, kind), lower
+    """a · b + c, rounded once, of lanes, singles or numbers."""
+    kind = next((arg for arg in (a, b, c) if arg in FLOATS), types.float64)
+    call = _instruction("llvm.fma")
+    return kind(kind, kind, kind), lambda context, builder, sig, args: call(builder, *args)
 
 
 @intrinsic
 def spread(typing, number):
-    """The same number in all lanes."""
-    kind = PLACES if isinstance(number, types.Integer) else LANES
-    scalar = types.int32 if kind is PLACES else types.float64
+    """The same number in all lanes: of a float64, an integer, or in singles of a float32."""
+    kind = PLACES if isinstance(number, types.Integer) else SINGLES if number == types.float32 else LANES
 
     def lower(context, builder, sig, args):
-        return _spread(builder, args[0])
+        return _spread(builder, args[0], kind.vector.count)
 
-    return kind(scalar), lower
+    return kind(kind.single), lower
 
 
 @intrinsic
@@ -172,7 +237,8 @@ def any_of(typing, mask):
     """Whether any lane is true."""
 
     def lower(context, builder, sig, args):
-        return builder.icmp_unsigned("!=", builder.bitcast(args[0], _BYTE), ir.Constant(_BYTE, 0))
+        bits = ir.IntType(mask.vector.count)
+        return builder.icmp_unsigned("!=", builder.bitcast(args[0], bits), ir.Constant(bits, 0))
 
     return types.boolean(mask), lower
 
@@ -189,12 +255,13 @@ def all_of(typing, mask):
 
 @intrinsic
 def bits_of(typing, mask):
-    """A byte whose bit i is lane i."""
+    """A number whose bit i is lane i."""
+    number = {WIDTH: types.uint8, SIXTEEN: types.uint16}.get(mask.vector.count, types.uint32)
 
     def lower(context, builder, sig, args):
-        return builder.bitcast(args[0], _BYTE)
+        return builder.bitcast(args[0], ir.IntType(mask.vector.count))
 
-    return types.uint8(mask), lower
+    return number(mask), lower
 
 
 @intrinsic
@@ -330,19 +397,20 @@ def _address(context, builder, kind, array, index, vector):
 
 @intrinsic
 def load(typing, array, i):
-    """Eight numbers of an array, from element i on: lanes of float64, places of int32."""
-    kind = PLACES if array.dtype == types.int32 else LANES
+    """Eight numbers of an array, from element i on, lanes of float64 or places of int32; or singles of float32."""
+    return _load(array, {types.int32: PLACES, types.float32: SINGLES}.get(array.dtype, LANES))
 
+
+def _load(array, kind):
     def lower(context, builder, sig, args):
-        vector = ir.VectorType(kind.element, WIDTH)
-        return builder.load(_address(context, builder, sig.args[0], args[0], args[1], vector), align=4)
+        return builder.load(_address(context, builder, sig.args[0], args[0], args[1], kind.vector), align=4)
 
     return kind(array, types.uint64), lower
 
 
 @intrinsic
 def store(typing, array, i, value):
-    """Put lanes or places into an array, from element i on."""
+    """Put lanes, places, singles or numbers into an array, from element i on."""
 
     def lower(context, builder, sig, args):
         builder.store(args[2], _address(context, builder, sig.args[0], args[0], args[1], args[2].type), align=4)
@@ -370,7 +438,7 @@ def load_pair(typing, array, i, j):
 
     def lower(context, builder, sig, args):
         array, *starts = args
-        half = ir.VectorType(kind.element, WIDTH // 2)
+        half = ir.VectorType(kind.vector.element, WIDTH // 2)
         addresses = [_address(context, builder, sig.args[0], array, start, half) for start in starts]
         return _joined(builder, [builder.load(address, align=4) for address in addresses])
 
@@ -472,7 +540,7 @@ def gather(typing, array, places):
     kind = PLACES if array.dtype == types.int32 else LANES
 
     def lower(context, builder, sig, args):
-        found = ir.Constant(ir.VectorType(kind.element, WIDTH), ir.Undefined)
+        found = ir.Constant(kind.vector, ir.Undefined)
         start = context.make_array(sig.args[0])(context, builder, args[0]).data
         for lane in range(WIDTH):
             where = ir.Constant(_INT32, lane)
@@ -502,27 +570,36 @@ def store_boxes(typing, table, i, left, right, top, bottom):
 @intrinsic
 def fetch_ahead(typing, array, i):
     """Ask the processor to bring an element of an array into its cache: it will be wanted soon."""
+    return _fetch(array, 0)
 
+
+@intrinsic
+def fetch_to_write(typing, array, i):
+    """The same for an element that will be written to."""
+    return _fetch(array, 1)
+
+
+def _fetch(array, writes):
     def lower(context, builder, sig, args):
         start = context.make_array(sig.args[0])(context, builder, args[0]).data
         pointer = builder.bitcast(builder.gep(start, [args[1]]), _BYTE.as_pointer())
         kind = ir.FunctionType(ir.VoidType(), [pointer.type, _INT32, _INT32, _INT32])
         prefetch = get_or_insert_function(builder.module, kind, "llvm.prefetch.p0")
-        builder.call(prefetch, [pointer, *(ir.Constant(_INT32, n) for n in (0, 3, 1))])
+        builder.call(prefetch, [pointer, *(ir.Constant(_INT32, n) for n in (writes, 3, 1))])
         return context.get_dummy_value()
 
     return types.void(array, types.uint64), lower
 
 
 @intrinsic
-def take_number(typing, array):
-    """An int64 array's first element, which then is one more: threads that ask at one time get different ones."""
+def take_number(typing, array, i):
+    """Element i of an int64 array, which then is one more: threads that ask at one time get different ones."""
 
     def lower(context, builder, sig, args):
         start = context.make_array(sig.args[0])(context, builder, args[0]).data
-        return builder.atomic_rmw("add", start, ir.Constant(ir.IntType(64), 1), "monotonic")
+        return builder.atomic_rmw("add", builder.gep(start, [args[1]]), ir.Constant(ir.IntType(64), 1), "monotonic")
 
-    return types.int64(array), lower
+    return types.int64(array, types.uint64), lower
 
 
 # ------------------------------------------------------------------------------------------------------- pixels

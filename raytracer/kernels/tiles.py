@@ -17,37 +17,62 @@ from raytracer.kernels.lanes import (
     WIDTH,
     any_of,
     at_least,
-    first_of,
-    gather,
-    gather_rows,
     is_hit,
     largest_of,
     load,
     put_pixels,
-    same,
     spread,
     store,
     take_number,
 )
+from raytracer.kernels.quick import (
+    diffuse_quickly,
+    diffuse_quickly_unchecked,
+    flat_quickly,
+    never_quickly,
+    nothing_left,
+    shade_anew,
+)
+from raytracer.kernels.surfaces import ball_of, diffuse_of_any, diffuse_of_spheres, line_of, normal, ray_of
 from raytracer.kernels.visibility import STRIDE, list_doubts, see_tile, see_tile_unchecked
-from raytracer.shading import cosine, land, land_on_any, to_byte, towards
+from raytracer.shading import to_byte
 from raytracer.twofold import select
+
+ROOM = 3 * TILE_WIDTH * TILE_HEIGHT  # for doubts: of a tile, and of pixels that have been put off
 
 
 def _paint(view, slow, bins, tiles, scratch, doubts, paints, out):
     """Paint tiles, as long as there are any and there is room for doubts; returns whether all are done, or taken."""
-    while len(doubts) - doubts[0] > TILE_WIDTH * TILE_HEIGHT:
-        number = take_number(tiles.next)
-        if number >= tiles.last:
+    while len(doubts) - doubts[0] > ROOM:
+        number = _take(tiles)
+        if number < 0:
+            finish(view, paints, scratch, doubts, out)
             return True
         tile = _tile(view, bins, number)
         if len(slow.ids) == 0 and bins.starts[number] == bins.starts[number + 1]:
             fill_tile(scratch, tile, paints, out)
             continue
+        if paint_quickly(view, slow, bins, tile, scratch, doubts, paints, out):
+            continue
         if see(view, slow, bins, tile, scratch):
             list_doubts(view, tile, scratch, doubts)
         paint_tile(view, scratch, tile, paints, out)
+    finish(view, paints, scratch, doubts, out)
     return False
+
+
+@borrowing
+def _take(tiles):
+    """The number of a tile that nobody has taken, −1 if there is none."""
+    runs = len(tiles.next)
+    length = (tiles.last - tiles.first + runs - 1) // runs
+    for turn in range(runs):
+        run = (tiles.own + turn) % runs
+        start = tiles.first + run * length
+        number = start + take_number(tiles.next, np.uint64(run))
+        if number < min(start + length, tiles.last):
+            return number
+    return -1
 
 
 @inlined
@@ -100,7 +125,7 @@ def _flat_tile(view, scratch, tile, paints, out):
 def _shaded_tile(view, scratch, tile, paints, out):
     background, some = _background(paints), len(out.wanted) > 0
     for row in range(tile.top, tile.bottom):
-        line = _line(view, row)
+        line = line_of(view, row)
         for x in range(tile.left, tile.right, WIDTH):
             if some and not out.wanted[row - out.first_row, x // WIDTH]:
                 continue
@@ -116,29 +141,10 @@ def _shaded_tile(view, scratch, tile, paints, out):
             put_lanes(out, row, x, tile.right, red, green, blue, scratch)
 
 
-def _diffuse(view, paints, line, k, row, x, where, hit, scratch):
-    """`stages.diffuse`."""
-    p, n, radius = surface(view, line, k, x, where)
-    red, green, blue, light = spread(0.0), spread(0.0), spread(0.0), paints.lights
-    for i in range(np.uint64(len(light))):
-        facing, square = towards(p, n, (light[i, 0], light[i, 1], light[i, 2]))
-        shine = cosine(facing, square, radius)
-        red, green, blue = red + light[i, 3] * shine, green + light[i, 4] * shine, blue + light[i, 5] * shine
-    r, g, b, _ = _colours(view, paints, where)
-    return red * r, green * g, blue * b
-
-
-@inlined
-def _normal(view, paints, line, k, row, x, where, hit, scratch):
-    """`stages.normal`."""
-    _, n, radius = _surface_of_any(view, line, k, x, where)
-    return (n[0] / radius + 1.0) / 2.0, (n[1] / radius + 1.0) / 2.0, (n[2] / radius + 1.0) / 2.0
-
-
 @inlined
 def _full(view, paints, line, k, row, x, where, hit, scratch):
     """`stages.full`."""
-    t, direction = _ray(view, line, k, x)
+    t, direction = ray_of(view, line, k, x)
     return radiance(view, paints, t, direction, where, hit, x, row, scratch)
 
 
@@ -146,56 +152,6 @@ def _full(view, paints, line, k, row, x, where, hit, scratch):
 def _place(tile, row, x):
     """Where a pixel is in the depth buffer."""
     return np.uint64((row - tile.top) * STRIDE + x - tile.left)
-
-
-@inlined
-def _line(view, row):
-    """What a row's rays share: a1 and a0 of D·D, and D but for U·u."""
-    up, v, back, r = view.up[row], view.v, view.back, np.uint64(row)
-    return view.a1[r], view.a0[r], up * v[0] - back[0], up * v[1] - back[1], up * v[2] - back[2]
-
-
-@inlined
-def _surface_of_spheres(view, line, k, x, where):
-    """The hit points as seen from the eye and from their spheres' centres, and the radii."""
-    t, direction = _ray(view, line, k, x)
-    (cx, cy, cz, radius), eye = _ball(view, where), view.eye
-    p, n = land(t, direction, (eye[0] - cx, eye[1] - cy, eye[2] - cz), radius)
-    return p, n, radius
-
-
-@inlined
-def _surface_of_any(view, line, k, x, where):
-    """The same of spheres and triangles."""
-    t, direction = _ray(view, line, k, x)
-    return land_on_any(t, direction, view.eye, _ball(view, where), at_least(where, view.first_facet))
-
-
-@inlined
-def _ray(view, line, k, x):
-    """t, and D."""
-    across, (a1, a0, dx, dy, dz), u = load(view.across, x), line, view.u
-    t = k / ((across * view.a2 + a1) * across + a0)
-    return t, (across * u[0] + dx, across * u[1] + dy, across * u[2] + dz)
-
-
-@inlined
-def _ball(view, where):
-    """Centres and radii of the spheres at these places."""
-    if same(where):
-        i, balls = np.uint64(4) * np.uint64(first_of(where)), view.balls
-        cx, cy, cz, radius = balls[i], balls[i + np.uint64(1)], balls[i + np.uint64(2)], balls[i + np.uint64(3)]
-        return spread(cx), spread(cy), spread(cz), spread(radius)
-    return gather_rows(view.balls, where)
-
-
-@inlined
-def _colours(view, paints, where):
-    """The diffuse colours of the spheres at these places."""
-    if same(where):
-        i, colours = np.uint64(4) * np.uint64(view.material[np.uint64(first_of(where))]), paints.colours
-        return spread(colours[i]), spread(colours[i + np.uint64(1)]), spread(colours[i + np.uint64(2)]), spread(0.0)
-    return gather_rows(paints.colours, gather(view.material, where))
 
 
 @inlined
@@ -221,7 +177,7 @@ def _put_hits(out, at, room, t, place, scratch):
 def _hits_tile(view, scratch, tile, paints, out):
     """t and index as they are in the buffer."""
     for row in range(tile.top, tile.bottom):
-        a1, a0, _, _, _ = _line(view, row)
+        a1, a0, _, _, _ = line_of(view, row)
         start = np.uint64((row - out.first_row) * out.width)
         for x in range(tile.left, tile.right, WIDTH):
             across, place, at = load(view.across, x), _place(tile, row, x), start + np.uint64(x)
@@ -235,7 +191,7 @@ def _hits_tile(view, scratch, tile, paints, out):
 def _fine_hits_tile(view, scratch, tile, fine, out):
     """t to the last digit, and index; where that is not certain, NaN."""
     for row in range(tile.top, tile.bottom):
-        a1, a0, _, _, _ = _line(view, row)
+        a1, a0, _, _, _ = line_of(view, row)
         start, r = np.uint64((row - out.first_row) * out.width), np.uint64(row)
         for x in range(tile.left, tile.right, WIDTH):
             across, place, at = load(view.across, x), _place(tile, row, x), start + np.uint64(x)
@@ -245,7 +201,7 @@ def _fine_hits_tile(view, scratch, tile, fine, out):
                 _put_hits(out, at, tile.right - x, spread(np.inf), place, scratch)
                 continue
             t = load(scratch.k, place) / ((across * view.a2 + a1) * across + a0)
-            cx, cy, cz, radius = _ball(view, select(hit, index, spread(largest_of(index))))
+            cx, cy, cz, radius = ball_of(view, select(hit, index, spread(largest_of(index))))
             dx = fine_direction(across, low, u[0], fine.x[r], fine.x_low[r])
             dy = fine_direction(across, low, u[1], fine.y[r], fine.y_low[r])
             dz = fine_direction(across, low, u[2], fine.z[r], fine.z_low[r])
@@ -263,21 +219,39 @@ def _no_hits_tile(scratch, tile, paints, out):
             out.t[x], out.index[x] = np.inf, -1
 
 
-_diffuse_of_spheres = variant(_diffuse, "_diffuse_of_spheres", inlined, surface=_surface_of_spheres)
-_diffuse_of_any = variant(_diffuse, "_diffuse_of_any", inlined, surface=_surface_of_any)
-_diffuse_tile = variant(_shaded_tile, "_diffuse_tile", shade=_diffuse_of_spheres)
-_diffuse_any_tile = variant(_shaded_tile, "_diffuse_any_tile", shade=_diffuse_of_any)
-_normal_tile = variant(_shaded_tile, "_normal_tile", shade=_normal)
+_diffuse_tile = variant(_shaded_tile, "_diffuse_tile", shade=diffuse_of_spheres)
+_diffuse_any_tile = variant(_shaded_tile, "_diffuse_any_tile", shade=diffuse_of_any)
+_normal_tile = variant(_shaded_tile, "_normal_tile", shade=normal)
 _full_tile = variant(_shaded_tile, "_full_tile", shade=_full)
-paint_flat = variant(_paint, "paint_flat", paint_tile=_flat_tile, fill_tile=_fill_tile, see=see_tile)
-paint_diffuse = variant(_paint, "paint_diffuse", paint_tile=_diffuse_tile, fill_tile=_fill_tile, see=see_tile)
+paint_flat = variant(
+    _paint, "paint_flat", paint_quickly=flat_quickly, paint_tile=_flat_tile, fill_tile=_fill_tile, see=see_tile,
+    finish=nothing_left,
+)  # fmt: skip
+paint_diffuse = variant(
+    _paint, "paint_diffuse", paint_quickly=diffuse_quickly, paint_tile=_diffuse_tile, fill_tile=_fill_tile,
+    see=see_tile, finish=shade_anew,
+)  # fmt: skip
 paint_diffuse_unchecked = variant(
-    _paint, "paint_diffuse_unchecked", paint_tile=_diffuse_tile, fill_tile=_fill_tile, see=see_tile_unchecked
-)
+    _paint, "paint_diffuse_unchecked", paint_quickly=diffuse_quickly_unchecked, paint_tile=_diffuse_tile,
+    fill_tile=_fill_tile, see=see_tile_unchecked, finish=nothing_left,
+)  # fmt: skip
 paint_diffuse_any = variant(
-    _paint, "paint_diffuse_any", paint_tile=_diffuse_any_tile, fill_tile=_fill_tile, see=see_tile
-)
-paint_full = variant(_paint, "paint_full", paint_tile=_full_tile, fill_tile=_fill_tile, see=see_tile)
-paint_normal = variant(_paint, "paint_normal", paint_tile=_normal_tile, fill_tile=_fill_tile, see=see_tile)
-find_hits = variant(_paint, "find_hits", paint_tile=_hits_tile, fill_tile=_no_hits_tile, see=see_tile)
-find_fine_hits = variant(_paint, "find_fine_hits", paint_tile=_fine_hits_tile, fill_tile=_no_hits_tile, see=see_tile)
+    _paint, "paint_diffuse_any", paint_quickly=diffuse_quickly, paint_tile=_diffuse_any_tile, fill_tile=_fill_tile,
+    see=see_tile, finish=shade_anew,
+)  # fmt: skip
+paint_full = variant(
+    _paint, "paint_full", paint_quickly=never_quickly, paint_tile=_full_tile, fill_tile=_fill_tile, see=see_tile,
+    finish=nothing_left,
+)  # fmt: skip
+paint_normal = variant(
+    _paint, "paint_normal", paint_quickly=never_quickly, paint_tile=_normal_tile, fill_tile=_fill_tile, see=see_tile,
+    finish=nothing_left,
+)  # fmt: skip
+find_hits = variant(
+    _paint, "find_hits", paint_quickly=never_quickly, paint_tile=_hits_tile, fill_tile=_no_hits_tile, see=see_tile,
+    finish=nothing_left,
+)  # fmt: skip
+find_fine_hits = variant(
+    _paint, "find_fine_hits", paint_quickly=never_quickly, paint_tile=_fine_hits_tile, fill_tile=_no_hits_tile,
+    see=see_tile, finish=nothing_left,
+)  # fmt: skip

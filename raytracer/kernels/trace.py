@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from raytracer.arrays import TwofoldRays
+from raytracer.camera import fine_ray
 from raytracer.certified import (
     T_TOLERANCE,
     contends,
@@ -94,6 +96,17 @@ def _refine_eight(ox, oy, oz, rays, table, t, index, k):
     finer, sure = refine(found, x, y, z, load(ox, k), load(oy, k), load(oz, k), cx, cy, cz, radius)
     store(t, k, select(hit & sure, finer, found))
     return bits_of(hit & ~sure)
+
+
+@compiled
+def fine_rays(across, up, height, u, v, w, back):
+    """`plain.fine_rays`."""
+    n = len(across)
+    x, y, z, reach = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
+    x_low, y_low, z_low = np.empty(n), np.empty(n), np.empty(n)
+    for k in range(len(across)):
+        x[k], y[k], z[k], x_low[k], y_low[k], z_low[k], reach[k] = fine_ray(across[k], up[k], height, u, v, w, back)
+    return TwofoldRays(x, y, z, x_low, y_low, z_low, reach)
 
 
 @compiled

@@ -51,7 +51,7 @@ from raytracer.kernels.lanes import (
 
 STRIDE = TILE_WIDTH + WIDTH
 _HALF, _NEXT_ROW = np.uint64(WIDTH // 2), np.uint64(STRIDE)
-_AHEAD = 24  # list entries: how long before it is wanted a sphere is fetched
+AHEAD = 24  # list entries: how long before it is wanted a sphere is fetched
 
 
 def _see(view, slow, bins, tile, scratch):
@@ -89,9 +89,9 @@ def _look_at_eight(view, bins, first, scratch):
 @inlined
 def _draw(draw_row, draw_pair, view, bins, place, j, tile, scratch):
     """Draw the sphere at a place of the list, number j of the eight that were looked at."""
-    _fetch(view, _sphere(bins.entries[place + np.uint64(_AHEAD)]))
+    fetch(view, sphere_of(bins.entries[place + np.uint64(AHEAD)]))
     entry, batch = bins.entries[place], scratch.batch
-    i, (start, stop, high, low) = np.int32(_sphere(entry)), _corners(entry)
+    i, (start, stop, high, low) = np.int32(sphere_of(entry)), corners_of(entry)
     hu, hv, hw = batch[j], batch[j + np.uint64(8)], batch[j + np.uint64(16)]
     c, edge = batch[j + np.uint64(24)], batch[j + np.uint64(32)]
     doubts, line, x, p = False, high, np.uint64(tile.left + start), np.uint64(high * STRIDE + start)
@@ -108,19 +108,19 @@ def _draw(draw_row, draw_pair, view, bins, place, j, tile, scratch):
 
 
 @inlined
-def _fetch(view, sphere):
+def fetch(view, sphere):
     """A sphere will be wanted soon: to be drawn, and then to be painted."""
     fetch_ahead(view.balls, np.uint64(4) * sphere)
     fetch_ahead(view.material, sphere)
 
 
 @inlined
-def _sphere(entry):
+def sphere_of(entry):
     return entry & np.uint64(0xFFFFFFFF)
 
 
 @inlined
-def _corners(entry):
+def corners_of(entry):
     """Left, right, top, bottom of an entry's box within the tile."""
     corners = np.int64(entry >> np.uint64(32))
     return corners & 255, corners >> 8 & 255, corners >> 16 & 255, corners >> 24
@@ -172,7 +172,7 @@ def _keep(scratch, p, wins, k, best, i):
 @borrowing
 def _draw_facet(view, entry, tile, scratch):
     """A triangle in its box. Returns whether there are doubts."""
-    i, (start, stop, high, low) = np.int32(_sphere(entry)), _corners(entry)
+    i, (start, stop, high, low) = np.int32(sphere_of(entry)), corners_of(entry)
     f, at, doubts = view.facets, np.uint64(FACET) * (np.uint64(i) - np.uint64(view.first_facet)), False
     for line in range(high, low):
         row = np.uint64(tile.top + line)
@@ -312,21 +312,21 @@ def _merge(slow, bins, x, y, ids, at):
     tile, found, next_slow = y // TILE_HEIGHT * bins.columns + x // TILE_WIDTH, 0, 0
     for place in range(bins.starts[tile], bins.starts[tile + 1] + 1):
         last = place == bins.starts[tile + 1]
-        while next_slow < len(slow.ids) and (last or slow.ids[next_slow] < _sphere(bins.entries[place])):
+        while next_slow < len(slow.ids) and (last or slow.ids[next_slow] < sphere_of(bins.entries[place])):
             box = slow.boxes[next_slow]
             if box[0] <= x and x < box[1] and box[2] <= y and y < box[3]:
                 if len(ids):
                     ids[at + found] = slow.ids[next_slow]
                 found += 1
             next_slow += 1
-        if not last and _holds(bins.entries[place], x % TILE_WIDTH, y % TILE_HEIGHT):
+        if not last and holds(bins.entries[place], x % TILE_WIDTH, y % TILE_HEIGHT):
             if len(ids):
-                ids[at + found] = _sphere(bins.entries[place])
+                ids[at + found] = sphere_of(bins.entries[place])
             found += 1
     return found
 
 
 @inlined
-def _holds(entry, x, y):
-    left, right, top, bottom = _corners(entry)
+def holds(entry, x, y):
+    left, right, top, bottom = corners_of(entry)
     return left <= x and x < right and top <= y and y < bottom

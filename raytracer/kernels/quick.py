@@ -1,0 +1,487 @@
+"""A tile of small spheres in single precision: sixteen pixels at a time, and float64 for those that are not certain.
+
+    list of the tile ── _look ──> batch   what is drawn of eight spheres      ┌ blocks of 4 × 4 pixels ─┐
+                                  table   what is shaded, a row a sphere      │ 0 1 2 3 │ 16 17 … │     │
+    batch  ── _draw  ──> depth    k of the nearest hit so far                 │ 4 5 6 7 │         │     │
+                         number   which of the list that is                   │ …       │         │     │
+                         doubt    where single precision cannot tell          └─────────────────────────┘
+    doubt  ── _decide ─> number   in float64
+    number ── _shade ──> colours, in its place; those too close to another byte by _shade_anew, in float64
+    colours ─ _put   ──> bytes of the picture
+
+The formulas and the bounds of their errors are those of `quick`.
+"""
+
+import numpy as np
+
+from raytracer.certified import approach, edge_of, inner, side_of
+from raytracer.kernels.bounds import TILE_HEIGHT, TILE_WIDTH
+from raytracer.kernels.compiler import borrowing, inlined, variant
+from raytracer.kernels.lanes import (
+    SIXTEEN,
+    WIDTH,
+    any_of,
+    bits_of,
+    blend,
+    fetch_to_write,
+    gather,
+    gather_rows,
+    load,
+    load_low,
+    spread,
+    store,
+    whole,
+)
+from raytracer.kernels.sixteen import (
+    SIDE,
+    both,
+    columns_of_block,
+    gather_eight,
+    greater,
+    lesser,
+    load_numbers,
+    load_two,
+    lowest_bit,
+    put_sixteen,
+    rough_inverse,
+    rough_inverse_root,
+    rows_of_block,
+    sixteen,
+    store_halves,
+    store_table,
+    store_two,
+    times_plus,
+    two,
+    whole_numbers,
+)
+from raytracer.kernels.surfaces import diffuse_at, meet_spheres
+from raytracer.kernels.visibility import AHEAD, corners_of, fetch, holds, sphere_of
+from raytracer.quick import ONE_BYTE, coarseness_of, error_of, near_of
+from raytracer.shading import to_byte
+
+MOST = 1 << 12  # spheres of a tile's list; of more, the table would leave the core's caches
+_FEW_LATE = 256  # pixels to be shaded in float64: enough for a while
+_BLOCKS = TILE_WIDTH // SIDE  # side by side
+_LINE = SIXTEEN * _BLOCKS  # pixels of a line of blocks
+_PIXELS, _MIDDLE, _MIDDLE_Y = np.uint64(TILE_WIDTH * TILE_HEIGHT), TILE_WIDTH // 2, TILE_HEIGHT // 2
+_LIGHT = np.uint64(8)  # numbers a light
+_ONE, _SIXTEEN = np.uint64(1), np.uint64(SIXTEEN)
+_HALF, _UNIT, _ZERO, _STEP = np.float32(0.5), np.float32(1.0), np.float32(0.0), np.float32(SIDE)
+_DARKEST, _BRIGHTEST = np.float32(0.5 * ONE_BYTE), np.float32(255.5 * ONE_BYTE)
+_MASK = np.int32(ONE_BYTE - 1)
+_HOPELESS = np.float32(2.0**-8)  # an error of which no byte is certain
+_FLAT, _SPARE = np.float32(1.9), np.float32(4.0)  # see `quick`: c₀ / c₁, and what roundings at the end add
+_NEAR, _COARSE = np.uint64(120), np.uint64(128)  # where of the batch these are
+_SMALLEST, _LARGEST = 1e-10, 1e10  # depths that single precision can square
+
+
+def _paint_tile(view, slow, bins, tile, scratch, doubts, paints, out):
+    """Paint a tile, unless it has something in it that single precision is not for; returns whether it is painted."""
+    first, end, sheet = bins.starts[tile.number], bins.middles[tile.number], scratch.quick
+    if not paints.quick.usable or len(slow.ids) or len(out.wanted) or end - first > MOST:
+        return False
+    if end < bins.starts[tile.number + 1]:
+        return False
+    coarsest = draw_all(view, bins, first, end, tile, paints, sheet)
+    if coarsest < 0.0:
+        return False
+    if certain:
+        _decide(view, bins, tile, sheet, doubts)
+    if sheet.late[0] > _FEW_LATE:
+        catch_up(view, paints, scratch, doubts, out)
+    colour_all(view, bins, tile, coarsest, paints, sheet, out)
+    return True
+
+
+def _draw_all(view, bins, first, end, tile, paints, sheet):
+    """Fill the depth buffer; returns how coarse the coarsest sphere is, −1 if single precision is not for all."""
+    for p in range(np.uint64(0), _PIXELS, _SIXTEEN):
+        store(sheet.depth, p, spread(np.float32(np.inf)))
+        store(sheet.number, p, sixteen(0))
+    store(sheet.table, 0, spread(_ZERO))
+    tie, coarsest, s, batch = _ZERO, _ZERO, _longest(paints.quick, tile) / paints.quick.focus, sheet.batch
+    for at in range(first, end, WIDTH):
+        count, row = min(WIDTH, end - at), np.uint64(at - first)
+        unfit = look(view, bins, np.uint64(at), row, tile, s, paints, sheet)
+        if bits_of(unfit) & ((1 << count) - 1):
+            return np.float32(-1.0)
+        for j in range(np.uint64(0), np.uint64(count)):
+            place = np.uint64(at) + j
+            fetch(view, sphere_of(bins.entries[place + np.uint64(AHEAD)]))
+            tie, coarsest = max(tie, batch[_NEAR + j]), max(coarsest, batch[_COARSE + j])
+            draw(bins.entries[place], np.int32(row + j + _ONE), j, tie, sheet)
+    return coarsest
+
+
+def _look(view, bins, at, row, tile, s, paints, sheet):
+    """Work out what is drawn and shaded of the next eight spheres of a list.
+
+    Returns for which of them single precision is not.
+    """
+    quick, batch, where = paints.quick, sheet.batch, load_low(bins.entries, at)
+    x, y, z, radius = gather_rows(view.balls, where)
+    x, y, z = x - view.eye[0], y - view.eye[1], z - view.eye[2]
+    depth, pixel = -inner(quick.w[0], quick.w[1], quick.w[2], x, y, z), 1.0 / quick.focus
+    once = 1.0 / (depth * radius)
+    over, over_rho = once * radius, once * depth * depth
+    u = inner(quick.u[0], quick.u[1], quick.u[2], x, y, z) * over
+    v = inner(quick.v[0], quick.v[1], quick.v[2], x, y, z) * over
+    rho, blur = radius * over, over_rho * pixel
+    u2, v2, rho2, square = u * u, v * v, rho * rho, blur * blur
+    m, error = 1.0 + u2 + v2, error_of(quick.steep, rho, blur)
+    unfit = ~((depth > _SMALLEST) & (depth < _LARGEST) & (rho <= 0.25) & (blur < 128.0) & (m < quick.widest))
+    middle_x = u * quick.focus + (quick.middle_x - (tile.left + _MIDDLE))
+    middle_y = (quick.middle_y - (tile.top + _MIDDLE_Y)) - v * quick.focus
+    whole_x, whole_y = np.floor(middle_x), np.floor(middle_y)
+    store_halves(batch, 0, whole_x)
+    store_halves(batch, 8, middle_x - whole_x)
+    store_halves(batch, 16, whole_y)
+    store_halves(batch, 24, middle_y - whole_y)
+    store_halves(batch, 32, m)
+    store_halves(batch, 40, u * (2.0 * pixel))
+    store_halves(batch, 48, v * (-2.0 * pixel))
+    store_halves(batch, 56, (1.0 + v2 - rho2) * square)
+    store_halves(batch, 64, u * v * (square + square))
+    store_halves(batch, 72, (1.0 + u2 - rho2) * square)
+    store_halves(batch, 80, depth * m)
+    store_halves(batch, 88, depth * u * pixel)
+    store_halves(batch, 96, depth * v * -pixel)
+    store_halves(batch, 104, radius)
+    store_halves(batch, 112, 4.0 * error * m)
+    store_halves(batch, _NEAR, near_of(rho, error))
+    if shades:
+        coarse, scale = coarseness_of(blur, s, quick.focus), (255.0 * ONE_BYTE) * blur
+        store_halves(batch, _COARSE, coarse)
+        red, green, blue, _ = gather_rows(paints.colours, gather(view.material, where))
+        store_table(
+            sheet.table, row + _ONE, middle_x, middle_y, rho * quick.focus, depth * pixel, red * scale, green * scale,
+            blue * scale, coarse,
+        )  # fmt: skip
+    return unfit
+
+
+def _draw(entry, number, j, tie, sheet):
+    """Draw the sphere of an entry, number j of the eight that were looked at."""
+    b, eight = sheet.batch, np.uint64(8)
+    start, stop, high, low = corners_of(entry)
+    columns, rows = columns_of_block() - b[eight + j], rows_of_block() - b[np.uint64(24) + j]
+    middle, e1, e2, xx = b[np.uint64(32) + j], b[np.uint64(40) + j], b[np.uint64(48) + j], b[np.uint64(56) + j]
+    xy, yy, k0, k1 = b[np.uint64(64) + j], b[np.uint64(72) + j], b[np.uint64(80) + j], b[np.uint64(88) + j]
+    k2, radius, rim = b[np.uint64(96) + j], b[np.uint64(104) + j], b[np.uint64(112) + j]
+    own = sixteen(number)
+    left, right = start // SIDE, (stop + SIDE - 1) // SIDE
+    for line in range(high // SIDE, (low + SIDE - 1) // SIDE):
+        y = rows + (np.float32(SIDE * line - _MIDDLE_Y) - b[np.uint64(16) + j])
+        of_row, slope = times_plus(y, e2 - y * yy, spread(middle)), e1 - y * xy
+        k_row, shift = times_plus(y, spread(k2), spread(k0)), np.float32(SIDE * left - _MIDDLE) - b[j]
+        p = np.uint64(SIXTEEN * (line * _BLOCKS + left))
+        for _ in range(right - left):
+            x, best = columns + shift, load(sheet.depth, p)
+            disc = times_plus(x, slope - x * xx, of_row)
+            k = times_plus(x, spread(k1), k_row) - _root(disc, rough_inverse_root(disc)) * radius
+            wins = k < best
+            store(sheet.depth, p, blend(wins, k, best))
+            store(sheet.number, p, blend(wins, own, load_numbers(sheet.number, p)))
+            if certain:
+                unsure = (abs(disc) <= rim) | (abs(k - best) <= k * tie)
+                if any_of(unsure):
+                    sheet.doubt[p // _SIXTEEN] |= bits_of(unsure)
+            shift += _STEP
+            p += _SIXTEEN
+
+
+@inlined
+def _root(x, rough):
+    """√x from a rough 1 / √x."""
+    root = x * rough
+    return times_plus(times_plus(-root, root, x), rough * _HALF, root)
+
+
+@borrowing
+def _decide(view, bins, tile, sheet, doubts):
+    """Decide in float64 what single precision could not tell, and list what float64 cannot tell either."""
+    width = len(view.across) - WIDTH
+    for some in range(np.uint64(0), np.uint64(len(sheet.doubt)), _SIXTEEN):
+        blocks = np.int32(bits_of(load_numbers(sheet.doubt, some) > 0))
+        while blocks:
+            block = some + np.uint64(lowest_bit(blocks))
+            blocks &= blocks - 1
+            bits = sheet.doubt[block]
+            sheet.doubt[block] = 0
+            while bits:
+                p = np.int32(block) * SIXTEEN + lowest_bit(bits)
+                bits &= bits - 1
+                x, y = _pixel(p)
+                if tile.left + x < tile.right and tile.top + y < tile.bottom:
+                    number, unsure = _first_of(view, bins, tile, x, y)
+                    sheet.number[p] = number
+                    if unsure:
+                        doubts[0] += 1
+                        doubts[doubts[0]] = (tile.top + y) * width + tile.left + x
+
+
+@inlined
+def _pixel(p):
+    """Column and row of pixel p of the blocks."""
+    block, lane = p // SIXTEEN, p % SIXTEEN
+    return block % _BLOCKS * SIDE + lane % SIDE, block // _BLOCKS * SIDE + lane // SIDE
+
+
+@borrowing
+def _first_of(view, bins, tile, x, y):
+    """Which of a tile's list one of its pixels sees, counted from 1; and whether float64 cannot tell."""
+    best, number, unsure = np.inf, 0, False
+    eye, u, v, back = view.eye, view.u, view.v, view.back
+    across, up, row = view.across[tile.left + x], view.up[tile.top + y], tile.top + y
+    a = (across * view.a2 + view.a1[row]) * across + view.a0[row]
+    for place in range(bins.starts[tile.number], bins.middles[tile.number]):
+        entry = bins.entries[place]
+        if not holds(entry, x, y):
+            continue
+        i, balls = np.uint64(4) * sphere_of(entry), view.balls
+        lx, ly, lz = eye[0] - balls[i], eye[1] - balls[i + _ONE], eye[2] - balls[i + np.uint64(2)]
+        c, square = side_of(lx, ly, lz, balls[i + np.uint64(3)])
+        hv, hw = inner(v[0], v[1], v[2], lx, ly, lz), -inner(back[0], back[1], back[2], lx, ly, lz)
+        h = across * inner(u[0], u[1], u[2], lx, ly, lz) + (up * hv + hw)
+        k, wins, doubt = approach(h, a, c, edge_of(c, square, view.reach, view.kappa), best)
+        unsure |= doubt
+        if wins:
+            best, number = k, place - bins.starts[tile.number] + 1
+    return number, unsure
+
+
+def _colour_all(view, bins, tile, coarsest, paints, sheet, out):
+    """Colours and bytes, a line of blocks after the other; meanwhile the processor fetches where the next one goes."""
+    count = 0
+    for line in range((tile.bottom - tile.top + SIDE - 1) // SIDE):
+        _fetch_pixels(tile, line + 1, out)
+        count = colour_line(tile, line, coarsest, paints.quick, sheet, count)
+        _put(tile, line, sheet, out)
+    _keep_for_later(bins, tile, count, sheet)
+
+
+@inlined
+def _flat(tile, line, coarsest, quick, sheet, close):
+    """One colour wherever anything is hit."""
+    p, flat, background = np.uint64(_LINE * line), sixteen(quick.flat), sixteen(quick.background)
+    for at in range(np.uint64(0), np.uint64(_LINE), _SIXTEEN):
+        store(sheet.colour, at, blend(load_numbers(sheet.number, p + at) > 0, flat, background))
+    return close
+
+
+def _shade(tile, line, coarsest, quick, sheet, close):
+    """`stages.diffuse`. Returns how many blocks have been listed that have pixels close to another byte."""
+    background, start, count = sixteen(quick.background), np.uint64(_LINE * line), 0
+    for block in range(np.uint64(_BLOCKS)):
+        at = block * _SIXTEEN
+        store(sheet.colour, at, background)
+        sheet.blocks[count] = block
+        count += any_of(load_numbers(sheet.number, start + at) > 0)
+    sheet.blocks[count] = sheet.blocks[max(count - 1, 0)]
+    y = both(rows_of_block()) + np.float32(SIDE * line)
+    v, y = np.float32(quick.middle_y - tile.top) - y, y - _MIDDLE_Y
+    left, longest = np.float32(tile.left - quick.middle_x), _longest(quick, tile)
+    rim, longest = np.float32(16.0 * longest * longest * coarsest), np.float32(longest)
+    for k in range(np.uint64(0), np.uint64(count), np.uint64(2)):
+        one, other = np.uint64(sheet.blocks[k]), np.uint64(sheet.blocks[k + _ONE])
+        x = both(columns_of_block()) + two(np.float32(np.int64(one) * SIDE), np.float32(np.int64(other) * SIDE))
+        p, q = start + one * _SIXTEEN, start + other * _SIXTEEN
+        red, green, blue, error, none = _light(quick, sheet, p, q, x - _MIDDLE, y, x + left, v, longest, rim)
+        colour, hit = red >> 16 | (green >> 8 & 0xFF00) | (blue & 0xFF0000), load_two(sheet.number, p, q) > 0
+        store_two(sheet.colour, one * _SIXTEEN, other * _SIXTEEN, blend(hit, colour, quick.background))
+        if certain:
+            bits = bits_of(
+                hit & (none | _is_close(red, error[0]) | _is_close(green, error[1]) | _is_close(blue, error[2]))
+            )
+            close = _list(sheet, close, p, bits & 0xFFFF)
+            close = _list(sheet, close, q, bits >> 16)
+    return close
+
+
+@inlined
+def _list(sheet, close, p, bits):
+    """List a block, if it has any bits; returns how many are listed then. Without a branch, which nobody could tell."""
+    sheet.close[close], sheet.bits[close] = p, bits
+    return close + (bits > 0)
+
+
+@inlined
+def _longest(quick, tile):
+    """The length in pixels of the longest ray of a tile."""
+    u = max(abs(tile.left - quick.middle_x), abs(tile.right - quick.middle_x))
+    v = max(abs(tile.top - quick.middle_y), abs(tile.bottom - quick.middle_y))
+    return np.sqrt(u * u + v * v + quick.focus * quick.focus)
+
+
+@inlined
+def _light(quick, sheet, p, q, x, y, u, v, longest, rim):
+    """Three channels of two blocks of pixels, in parts of a byte, bounds of their errors, and where there are none.
+
+    x and y count from the middle of the tile, u and v from the middle of the picture: the ray is (u, v, −focus).
+    """
+    at_x, at_y, size, unit, r, g, b, coarse = gather_eight(sheet.table, sheet.number, p, q)
+    focus, focus2, du, dv = np.float32(quick.focus), np.float32(quick.focus * quick.focus), x - at_x, at_y - y
+    along, a, size2 = times_plus(du, u, dv * v), times_plus(u, u, times_plus(v, v, focus2)), size * size
+    disc = times_plus(along, along, a * (size2 - times_plus(du, du, dv * dv)))
+    rough, over = rough_inverse_root(disc), rough_inverse(a)
+    over = times_plus(times_plus(-a, over, _UNIT), over, over)
+    tau = -(along + _root(disc, rough)) * over
+    t, nu, nv, nw = times_plus(unit, tau, unit), times_plus(tau, u, du), times_plus(tau, v, dv), tau * focus
+    pu, pv, pw = t * u, t * v, t * focus
+    light, nothing = quick.lights, both(spread(_ZERO))
+    red, green, blue, nearness = nothing, nothing, nothing, nothing
+    for i in range(np.uint64(0), np.uint64(len(light)), _LIGHT):
+        tu, tv, tw = light[i] - pu, light[i + _ONE] - pv, light[i + np.uint64(2)] + pw
+        facing = times_plus(nu, tu, times_plus(nv, tv, -(nw * tw)))
+        square = times_plus(tu, tu, times_plus(tv, tv, tw * tw))
+        length = rough_inverse_root(square)
+        length = times_plus(times_plus(-(square * length), length, _UNIT), length * _HALF, length)
+        shine = greater(facing, _ZERO) * length
+        red = times_plus(shine, light[i + np.uint64(3)], red)
+        green = times_plus(shine, light[i + np.uint64(4)], green)
+        blue = times_plus(shine, light[i + np.uint64(5)], blue)
+        nearness = times_plus(length, light[i + np.uint64(6)], nearness)
+    off = times_plus(rough * size, longest, _FLAT) * coarse
+    error = times_plus(nearness, np.float32(quick.far), np.float32(quick.rounding))
+    error = times_plus(times_plus(nearness, unit * size, np.float32(quick.weight)), off, error)
+    none, error = ~((disc > size2 * rim) & (error <= _HOPELESS)), error * size
+    return _parts(red, r), _parts(green, g), _parts(blue, b), (error * r, error * g, error * b), none
+
+
+@inlined
+def _parts(light, colour):
+    """A channel in parts of a byte, from half a byte on."""
+    channel = times_plus(light, colour, _DARKEST)
+    return whole_numbers(lesser(greater(channel, _DARKEST), _BRIGHTEST))
+
+
+@inlined
+def _is_close(channel, error):
+    """Where a channel is so close to the border of two bytes that its error may reach beyond."""
+    error = whole_numbers(error + _SPARE)
+    return (channel + error & _MASK) <= error + error
+
+
+@borrowing
+def _keep_for_later(bins, tile, count, sheet):
+    """List the pixels of a tile that are to be shaded in float64, from so many blocks."""
+    late, last = sheet.late[0], bins.starts[tile.number] - 1
+    for k in range(count):
+        bits = sheet.bits[k]
+        while bits:
+            p = sheet.close[k] + lowest_bit(bits)
+            bits &= bits - 1
+            x, y = _pixel(p)
+            if tile.left + x < tile.right and tile.top + y < tile.bottom:
+                sheet.columns[late], sheet.rows[late] = tile.left + x, tile.top + y
+                sheet.spheres[late] = sphere_of(bins.entries[last + sheet.number[p]])
+                late += 1
+    sheet.late[0] = late
+
+
+@borrowing
+def shade_anew(view, paints, scratch, doubts, out):
+    """Shade the pixels that have been listed for that in float64, eight at a time.
+
+    Not at once: what has just been written, a number after the other, cannot be read as a vector before all stores that
+    wait for the picture's memory are done. What float64 is not certain of is added to the list of doubts.
+    """
+    sheet = scratch.quick
+    count, sheet.late[0], width = sheet.late[0], 0, len(view.across) - WIDTH
+    for spare in range(count, count + WIDTH):
+        sheet.columns[spare], sheet.rows[spare] = sheet.columns[0], sheet.rows[0]
+        sheet.spheres[spare] = sheet.spheres[0]
+    for k in range(np.uint64(0), np.uint64(count), np.uint64(WIDTH)):
+        where, rows, columns = load(sheet.spheres, k), load(sheet.rows, k), load(sheet.columns, k)
+        t, direction, doubt = meet_spheres(view, rows, columns, where)
+        bits = np.int32(bits_of(doubt))
+        while bits:
+            pixel = k + np.uint64(lowest_bit(bits))
+            bits &= bits - 1
+            doubts[0] += 1
+            doubts[doubts[0]] = sheet.rows[pixel] * width + sheet.columns[pixel]
+        red, green, blue = diffuse_at(view, paints, direction, t, columns, where, scratch)
+        red, green, blue = whole(to_byte(red)), whole(to_byte(green)), whole(to_byte(blue))
+        store(sheet.spheres, k, red + green * 256 + blue * 65536)
+    for k in range(count):
+        start = (sheet.rows[k] - out.first_row) * out.row_bytes + sheet.columns[k] * out.pixel_bytes
+        _put_pixel(out, np.uint64(start), sheet.spheres[k])
+
+
+@inlined
+def _put_pixel(out, start, colour):
+    for channel in range(3):
+        out.bytes[start + np.uint64(channel)] = colour >> 8 * channel & 255
+
+
+@inlined
+def _fetch_pixels(tile, line, out):
+    """A line of blocks will be written to."""
+    width = np.uint64((tile.right - tile.left) * out.pixel_bytes)
+    for row in range(tile.top + SIDE * line, min(tile.top + SIDE * line + SIDE, tile.bottom)):
+        start = np.uint64((row - out.first_row) * out.row_bytes + tile.left * out.pixel_bytes)
+        for at in range(np.uint64(0), width, np.uint64(64)):
+            fetch_to_write(out.bytes, start + at)
+
+
+@inlined
+def _put(tile, line, sheet, out):
+    """A line of blocks as bytes of the picture."""
+    step, right = np.uint64(out.pixel_bytes), min(tile.right, out.columns)
+    for row in range(min(SIDE, tile.bottom - tile.top - SIDE * line)):
+        top = tile.top + SIDE * line + row - out.first_row
+        start = np.uint64(top * out.row_bytes + tile.left * out.pixel_bytes)
+        x, p = tile.left, np.uint64(SIDE * row)
+        while x + SIXTEEN <= right:
+            put_sixteen(out.bytes, start, step, sheet.colour, p)
+            x, start, p = x + SIXTEEN, start + _SIXTEEN * step, p + np.uint64(SIXTEEN * SIDE)
+        for pixel in range(np.uint64(tile.right - x)):
+            _put_pixel(
+                out,
+                start + pixel * step,
+                sheet.colour[p + pixel // np.uint64(SIDE) * _SIXTEEN + pixel % np.uint64(SIDE)],
+            )
+
+
+@inlined
+def nothing_left(view, paints, scratch, doubts, out):
+    """Where nothing has been put off."""
+
+
+_certain_sphere = variant(_draw, "_certain_sphere", inlined, certain=True)
+_unchecked_sphere = variant(_draw, "_unchecked_sphere", inlined, certain=False)
+_look_at_shape = variant(_look, "_look_at_shape", inlined, shades=False)
+_look_at_all = variant(_look, "_look_at_all", inlined, shades=True)
+_draw_shapes = variant(_draw_all, "_draw_shapes", draw=_certain_sphere, look=_look_at_shape)
+_draw_certain = variant(_draw_all, "_draw_certain", draw=_certain_sphere, look=_look_at_all)
+_draw_unchecked = variant(_draw_all, "_draw_unchecked", draw=_unchecked_sphere, look=_look_at_all)
+_shade_certain = variant(_shade, "_shade_certain", inlined, certain=True)
+_shade_unchecked = variant(_shade, "_shade_unchecked", inlined, certain=False)
+_colour_flat = variant(_colour_all, "_colour_flat", colour_line=_flat)
+_colour_certain = variant(
+    _colour_all,
+    "_colour_certain",
+    colour_line=_shade_certain,
+)
+_colour_unchecked = variant(
+    _colour_all,
+    "_colour_unchecked",
+    colour_line=_shade_unchecked,
+)
+flat_quickly = variant(
+    _paint_tile, "flat_quickly", draw_all=_draw_shapes, colour_all=_colour_flat, catch_up=nothing_left, certain=True
+)
+diffuse_quickly = variant(
+    _paint_tile, "diffuse_quickly", draw_all=_draw_certain, colour_all=_colour_certain, catch_up=shade_anew,
+    certain=True,
+)  # fmt: skip
+diffuse_quickly_unchecked = variant(
+    _paint_tile, "diffuse_quickly_unchecked", draw_all=_draw_unchecked, colour_all=_colour_unchecked,
+    catch_up=nothing_left, certain=False,
+)  # fmt: skip
+
+
+@inlined
+def never_quickly(view, slow, bins, tile, scratch, doubts, paints, out):
+    """For what single precision is not for."""
+    return False

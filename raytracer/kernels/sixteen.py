@@ -1,0 +1,342 @@
+"""What singles and numbers can do beyond what they have in common with lanes, mostly for blocks of 4 × 4 pixels.
+
+ 0  1  2  3
+ 4  5  6  7       the pixels of a block, as they lie in a vector
+ 8  9 10 11
+12 13 14 15
+"""
+
+from llvmlite import ir
+from llvmlite.binding import get_host_cpu_features
+from numba.core import types
+from numba.core.cgutils import get_or_insert_function
+from numba.extending import intrinsic
+
+from raytracer.kernels.lanes import (
+    FLOATS,
+    INTEGERS,
+    LANES,
+    NUMBER_PAIRS,
+    NUMBERS,
+    SINGLE_PAIRS,
+    SINGLES,
+    SIXTEEN,
+    WIDTH,
+    _address,
+    _joined,
+    _load,
+    _order,
+    _spread,
+    _suffix,
+)
+
+SIDE = 4
+_FLOAT, _INT32, _INT64, _BIT, _BYTE = ir.FloatType(), ir.IntType(32), ir.IntType(64), ir.IntType(1), ir.IntType(8)
+_COLUMNS = 2 * SIDE  # numbers of a row of a table
+_PROCESSOR = get_host_cpu_features()
+
+
+def _first(kinds, *args):
+    """The first of these types that is one of those kinds."""
+    return next(arg for arg in args if arg in kinds)
+
+
+@intrinsic
+def times_plus(typing, a, b, c):
+    """a · b + c, rounded once or twice, whichever the processor does sooner."""
+    kind = _first(FLOATS, a, b, c)
+
+    def lower(context, builder, sig, args):
+        a, b, c = args
+        if not _PROCESSOR.get("fma"):
+            return builder.fadd(builder.fmul(a, b), c)
+        function = ir.FunctionType(c.type, [c.type] * 3)
+        return builder.call(get_or_insert_function(builder.module, function, "llvm.fma" + _suffix(c.type)), args)
+
+    return kind(kind, kind, kind), lower
+
+
+def _estimate(instruction, exactly):
+    """A processor's own estimate to 14 bits, or what it stands for."""
+
+    def lower(context, builder, sig, args):
+        (x,) = args
+        if not _PROCESSOR.get("avx512f"):
+            return exactly(builder, x)
+        bits = ir.IntType(SIXTEEN)
+        vector = SINGLES.vector
+        function = get_or_insert_function(
+            builder.module, ir.FunctionType(vector, [vector, vector, bits]), f"llvm.x86.avx512.{instruction}.ps.512"
+        )
+        parts = [_part(builder, x, start) for start in range(0, x.type.count, SIXTEEN)]
+        return _joined(builder, [builder.call(function, [part, part, ir.Constant(bits, -1)]) for part in parts])
+
+    return lower
+
+
+def _part(builder, x, start):
+    """Sixteen of a vector."""
+    return builder.shuffle_vector(x, x, _order(range(start, start + SIXTEEN)))
+
+
+def _over(builder, x):
+    return builder.fdiv(ir.Constant(x.type, [1.0] * x.type.count), x)
+
+
+def _over_root(builder, x):
+    kind = ir.FunctionType(x.type, [x.type])
+    return _over(
+        builder, builder.call(get_or_insert_function(builder.module, kind, "llvm.sqrt" + _suffix(x.type)), [x])
+    )
+
+
+@intrinsic
+def rough_inverse(typing, x):
+    """1 / x, to 2⁻¹⁴ of itself."""
+    return x(x), _estimate("rcp14", _over)
+
+
+@intrinsic
+def rough_inverse_root(typing, x):
+    """1 / √x, to 2⁻¹⁴ of itself; not a number for x below 0."""
+    return x(x), _estimate("rsqrt14", _over_root)
+
+
+def _choice(sign):
+    """Of two the one that a comparison names."""
+
+    def make(typing, a, b):
+        kind = _first(FLOATS, a, b)
+        return kind(kind, kind), lambda context, builder, sig, args: builder.select(
+            builder.fcmp_ordered(sign, *args), *args
+        )
+
+    return make
+
+
+lesser = intrinsic(_choice("<"))  # in each lane; b where one is not a number
+greater = intrinsic(_choice(">"))
+
+
+@intrinsic
+def lesser_number(typing, a, b):
+    """The smaller one in each lane, of numbers not below 0."""
+    return a(a, a), lambda context, builder, sig, args: builder.select(builder.icmp_unsigned("<", *args), *args)
+
+
+@intrinsic
+def sixteen(typing, number):
+    """The same integer sixteen times."""
+    return NUMBERS(types.int32), lambda context, builder, sig, args: _spread(builder, args[0], SIXTEEN)
+
+
+@intrinsic
+def whole_numbers(typing, singles):
+    """Singles cut off to whole numbers."""
+    kind = INTEGERS[FLOATS.index(singles) - 1]
+    return kind(singles), lambda context, builder, sig, args: builder.fptosi(args[0], kind.vector)
+
+
+@intrinsic
+def lowest_bit(typing, bits):
+    """The number of the lowest bit that is set, of a number that is not 0."""
+
+    def lower(context, builder, sig, args):
+        return builder.cttz(args[0], ir.Constant(_BIT, 1))
+
+    return types.int32(types.int32), lower
+
+
+@intrinsic
+def columns_of_block(typing):
+    """In which column of the block each pixel is."""
+    numbers = ir.Constant(SINGLES.vector, [float(i % SIDE) for i in range(SIXTEEN)])
+    return SINGLES(), lambda context, builder, sig, args: numbers
+
+
+@intrinsic
+def rows_of_block(typing):
+    """In which row of the block each pixel is."""
+    numbers = ir.Constant(SINGLES.vector, [float(i // SIDE) for i in range(SIXTEEN)])
+    return SINGLES(), lambda context, builder, sig, args: numbers
+
+
+@intrinsic
+def load_numbers(typing, array, i):
+    """Sixteen int32 of an array, from element i on."""
+    return _load(array, NUMBERS)
+
+
+@intrinsic
+def store_halves(typing, array, i, lanes):
+    """Eight lanes as float32, from element i of an array on."""
+
+    def lower(context, builder, sig, args):
+        array, i, lanes = args
+        halves = _halves(builder, lanes)
+        builder.store(halves, _address(context, builder, sig.args[0], array, i, halves.type), align=4)
+        return context.get_dummy_value()
+
+    return types.void(array, types.uint64, LANES), lower
+
+
+def _halves(builder, lanes):
+    return builder.fptrunc(lanes, ir.VectorType(_FLOAT, WIDTH))
+
+
+@intrinsic
+def store_table(typing, table, row, a, b, c, d, e, f, g, h):
+    """Eight lanes each as the columns of rows `row` to `row` + 7 of a flat float32 table of eight columns."""
+
+    def lower(context, builder, sig, args):
+        table, row, *columns = args
+        for i, values in enumerate(_turned(builder, [_halves(builder, column) for column in columns])):
+            place = builder.add(builder.mul(row, ir.Constant(row.type, _COLUMNS)), ir.Constant(row.type, _COLUMNS * i))
+            builder.store(values, _address(context, builder, sig.args[0], table, place, values.type), align=4)
+        return context.get_dummy_value()
+
+    return types.void(table, types.uint64, *[LANES] * _COLUMNS), lower
+
+
+def _turned(builder, columns):
+    """The rows of eight columns of eight, by shuffles that cross the vector's halves only once."""
+
+    def shuffle(a, b, *order):
+        return builder.shuffle_vector(a, b, _order(order))
+
+    halves = []
+    for p, q, r, s in (columns[:SIDE], columns[SIDE:]):
+        pq = shuffle(p, q, 0, 8, 1, 9, 4, 12, 5, 13), shuffle(p, q, 2, 10, 3, 11, 6, 14, 7, 15)
+        rs = shuffle(r, s, 0, 8, 1, 9, 4, 12, 5, 13), shuffle(r, s, 2, 10, 3, 11, 6, 14, 7, 15)
+        halves.append(
+            [
+                shuffle(pq[k], rs[k], *order)
+                for k in (0, 1)
+                for order in ((0, 1, 8, 9, 4, 5, 12, 13), (2, 3, 10, 11, 6, 7, 14, 15))
+            ]
+        )
+    near = [shuffle(a, b, 0, 1, 2, 3, 8, 9, 10, 11) for a, b in zip(*halves, strict=True)]
+    far = [shuffle(a, b, 4, 5, 6, 7, 12, 13, 14, 15) for a, b in zip(*halves, strict=True)]
+    return near + far
+
+
+@intrinsic
+def load_two(typing, array, i, j):
+    """Sixteen numbers of an array from element i on, and sixteen from j on."""
+    kind = {types.int32: NUMBER_PAIRS, types.float32: SINGLE_PAIRS}[array.dtype]
+
+    def lower(context, builder, sig, args):
+        array, *starts = args
+        vector = ir.VectorType(kind.vector.element, SIXTEEN)
+        addresses = [_address(context, builder, sig.args[0], array, start, vector) for start in starts]
+        return _joined(builder, [builder.load(address, align=4) for address in addresses])
+
+    return kind(array, types.uint64, types.uint64), lower
+
+
+@intrinsic
+def store_two(typing, array, i, j, value):
+    """Put one half into an array from element i on, the other from j on."""
+
+    def lower(context, builder, sig, args):
+        array, *starts, value = args
+        for k, start in enumerate(starts):
+            part = _part(builder, value, SIXTEEN * k)
+            builder.store(part, _address(context, builder, sig.args[0], array, start, part.type), align=4)
+        return context.get_dummy_value()
+
+    return types.void(array, types.uint64, types.uint64, value), lower
+
+
+@intrinsic
+def two(typing, a, b):
+    """Sixteen times one number, and sixteen times another."""
+
+    def lower(context, builder, sig, args):
+        return _joined(builder, [_spread(builder, number, SIXTEEN) for number in args])
+
+    return SINGLE_PAIRS(types.float32, types.float32), lower
+
+
+@intrinsic
+def both(typing, singles):
+    """Singles twice."""
+    return SINGLE_PAIRS(SINGLES), lambda context, builder, sig, args: _joined(builder, [args[0], args[0]])
+
+
+@intrinsic
+def gather_eight(typing, table, numbers, i, j):
+    """The rows of a flat float32 table of eight columns, as eight pairs of singles.
+
+    Which rows the sixteen int32 say that begin with element i of an array, and those with element j.
+    """
+
+    def lower(context, builder, sig, args):
+        table, numbers, *places = args
+        parts = [_gather(context, builder, sig, table, numbers, place) for place in places]
+        columns = [_joined(builder, list(pair)) for pair in zip(*parts, strict=True)]
+        return context.make_tuple(builder, sig.return_type, columns)
+
+    return types.UniTuple(SINGLE_PAIRS, _COLUMNS)(table, numbers, types.uint64, types.uint64), lower
+
+
+def _gather(context, builder, sig, table, numbers, at):
+    """Eight columns of sixteen rows."""
+    first = context.make_array(sig.args[1])(context, builder, numbers).data
+    starts = []
+    for lane in range(SIXTEEN):
+        place = builder.gep(first, [builder.add(at, ir.Constant(at.type, lane))])
+        # one by one, as to take a vector apart costs more: the compiler does that if it has loaded one there
+        number = builder.load_atomic(place, "monotonic", 4)
+        starts.append(builder.mul(builder.zext(number, _INT64), ir.Constant(_INT64, _COLUMNS)))
+    columns = []
+    for half in (0, SIDE):
+        rows = []
+        for start in starts:
+            place = builder.add(start, ir.Constant(_INT64, half))
+            address = _address(context, builder, sig.args[0], table, place, ir.VectorType(_FLOAT, SIDE))
+            rows.append(builder.load(address, align=4))
+        columns += _four_columns(builder, [_joined(builder, rows[k::SIDE]) for k in range(SIDE)])
+    return columns
+
+
+def _four_columns(builder, rows):
+    """Four vectors: in each quarter of them, the columns of what is in that quarter of four."""
+
+    def shuffle(a, b, *order):
+        quarters = [[SIXTEEN * (i // SIDE) + SIDE * q + i % SIDE for i in order] for q in range(SIDE)]
+        return builder.shuffle_vector(a, b, _order([i for quarter in quarters for i in quarter]))
+
+    p, q, r, s = rows
+    near = shuffle(p, q, 0, 4, 1, 5), shuffle(r, s, 0, 4, 1, 5)
+    far = shuffle(p, q, 2, 6, 3, 7), shuffle(r, s, 2, 6, 3, 7)
+    return [shuffle(a, b, *order) for a, b in (near, far) for order in ((0, 1, 4, 5), (2, 3, 6, 7))]
+
+
+@intrinsic
+def put_sixteen(typing, picture, start, step, colours, at):
+    """Sixteen pixels of a row as bytes, from byte `start` of a flat picture on; a pixel takes `step` bytes, 3 or 4.
+
+    They come from four blocks that lie side by side, int32 with red in the lowest byte, the first from element `at` on.
+    A fourth byte stays what it is.
+    """
+
+    def lower(context, builder, sig, args):
+        picture, start, step, colours, at = args
+        row, quads = ir.VectorType(_INT32, SIDE), []
+        for block in range(SIDE):
+            place = builder.add(at, ir.Constant(at.type, SIXTEEN * block))
+            quads.append(builder.load(_address(context, builder, sig.args[3], colours, place, row), align=4))
+        wide = builder.bitcast(_joined(builder, quads), ir.VectorType(_BYTE, 4 * SIXTEEN))
+        with builder.if_else(builder.icmp_unsigned("==", step, ir.Constant(step.type, 3))) as (three, four):
+            with three:
+                order = _order([4 * pixel + colour for pixel in range(SIXTEEN) for colour in range(3)])
+                pixels = builder.shuffle_vector(wide, wide, order)
+                builder.store(pixels, _address(context, builder, sig.args[0], picture, start, pixels.type), align=1)
+            with four:
+                address = _address(context, builder, sig.args[0], picture, start, wide.type)
+                keep = ir.Constant(ir.VectorType(_BIT, 4 * SIXTEEN), [True, True, True, False] * SIXTEEN)
+                builder.store(builder.select(keep, wide, builder.load(address, align=1)), address, align=1)
+        return context.get_dummy_value()
+
+    return types.void(picture, types.uint64, types.uint64, colours, types.uint64), lower

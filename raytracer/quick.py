@@ -1,0 +1,135 @@
+"""Small spheres in single precision: sixteen pixels at a time, and float64 wherever that is not certain.
+
+What a picture of many spheres costs is float64: half as many lanes, divisions and roots. Single precision has rough
+roots that cost no more than a sum, but may be used only where it is known how far off it is. That is worked out here;
+`kernels.quick` does the arithmetic. Single precision decides what can be seen, and which byte a colour is only where
+float64 is sure to say the same: the picture is float64's, byte for byte.
+
+Everything is counted in pixels from the middle of a tile, where whole numbers are exact, and a sphere is seen where its
+centre is, at (X, Y), w = f·ρ pixels large, f the focal length in pixels and ρ the radius by the depth z of the centre.
+With x, y from there, and (U, V, −1) the centre's ray, m = 1 + U² + V², a ray D = (u, v, −f)/f meets the sphere where
+the discriminant, divided by r²,
+
+    disc = m + e₁x + e₂y − (a x² + b xy + c y²) / w²,  a = 1 + V² − ρ²,  b = 2UV,  c = 1 + U² − ρ²,
+
+is above 0: a quadratic form about the sphere's own middle, in which nothing cancels (h² − a·c of `certified` does, the
+more the smaller a sphere is). k = D·D·t = z(m + (Ux + Vy)/f) − r√disc.
+
+**Whether a pixel is hit.** u = 2⁻²⁴. By m, let T be (a x² + c y²) / w², and s = 1/(1 − θ) with θ = |UV| / √(ac), so
+that the whole form is at least T/s; where disc is near 0, T ≤ s(1.05 + 16ρ) for ρ ≤ ¼ and s ≤ 8. Coefficients are
+rounded once, each product and sum once: (4 + 4θ)T + 3(e₁x + e₂y)/m + 2.5 times u. x = (column − rest of X) + whole
+numbers is off by (4.5 + 1.1|x|)u, of which disc has 2.2√T + 0.5 times 1/w, and y likewise. Together, by m,
+
+    error = u (14.2 T + 4 + (9.9 T + 14.4) / w)
+
+and a pixel with |disc| ≤ 4 · error · m is left to float64. For all others √disc is within √(error · m) / 4, and k,
+which is at least 0.4 zm, within (2.5ρ(√error/4 + 8u) + 24u)k: nearer to each other than the sum of both, two spheres
+are left to float64, too. s is below 2ac / ((1 − ρ²)(m − ρ²)), which for one m is largest where U = V.
+
+**What colour it has.** In pixels, with D = (u, v, −f), the hit is at n = δ + τD from the sphere's middle, where
+δ = (x, y, 0), τ = −(g + √(g² − a(w² − δ²))) / a, g = δ·D, a = D·D. Let s² be the largest a/f² of a pixel of the tile,
+and t² = s² − 1; then |δ| ≤ 1.05sw. u and v are exact; x and y count from the middle of a tile, up to 64 and 16, so δ is
+off by √2ηw, η = u(47/w + 2.1s); f and w are rounded once. So g is off by √a·w(1.42η + 2.1tu), the root's argument by
+aw²·2c₁, and n by w·q, where cos is the root by its largest value and
+
+    q = c₀ + c₁/cos < c₁(1.9 + 1/cos),  c₁ = 1.5(s + t)η + (2.2t² + 3.85s² + 2)u,  c₀ = 2.84η + (7.4t + 6.5)u
+
+as long as cos² > 16c₁. (What float64 itself leaves of the error of its k, 2⁻²⁶ at most, is below 2⁻⁵²/(ρ² cos), and
+added to c₁.) The point P is off by r·q and by 4u|P|, the light's place by u of itself; so the direction towards it by
+(r·q + 5u|light|) / |T| + 5u, as |P| ≤ |T| + |light|. n·T, the rough root of T·T and their product are off by 8u,
+colours by 2u, each light's sum by 1u. So a channel is off by 255 · (its diffuse colour) times
+
+    Σ light · (q (1 + r/|T|) + 5u|light|/|T| + (16 + lights)u)
+
+and what comes that close to the border of two bytes is shaded anew, in float64.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from math import hypot
+
+import numpy as np
+
+from raytracer.arrays import Quick
+from raytracer.camera import SAMPLINGS, Raster, focal_length
+from raytracer.certified import inner
+from raytracer.scene import Camera, Colour, Light
+from raytracer.stages import light_from_eye
+from raytracer.twofold import Number
+
+U = 2.0**-24
+ONE_BYTE = 65536.0  # bytes have so many parts here
+_CROOKED = 2.0**-40  # a frame whose vectors are no more than this off unit length and right angles is taken for right
+_LONGEST = 2.0**16  # focal length in pixels
+_BEYOND = 0.25  # how far beyond the picture's U and V a sphere's middle may be
+_STEEPEST = 8.0
+_NEAREST, _FARTHEST = 1e-10, 1e10  # lengths whose squares single precision holds
+_BRIGHTEST = 1e4
+_SPARE = 1.1  # for squares of errors
+_ROOT = 2.0**-9  # about √error
+_LEAST = 15 / 16  # 1 − ρ²
+
+
+def error_of(steep: float, rho: Number, blur: Number) -> Number:
+    """How much disc may be off, relatively to m, for the largest s, ρ and 1 / w."""
+    form = steep * (1.05 + 16.0 * rho)
+    return U * (14.2 * form + 4.0 + (9.9 * form + 14.4) * blur)
+
+
+def near_of(rho: Number, error: Number) -> Number:
+    """How much k may be off, relatively, twice and a little more: √error ≤ (error / g + g) / 2 for any g."""
+    return 2.1 * (2.5 * rho * ((error / _ROOT + _ROOT) * 0.125 + 8.0 * U) + 24.0 * U)
+
+
+def coarseness_of(blur: Number, s: float, focus: float) -> Number:
+    """c₁, for 1 / w, s and f."""
+    t2 = s * s - 1.0
+    wide = _SPARE * U * 1.5 * (s + np.sqrt(t2))
+    return (2.0**-52 * focus * focus * blur + 47.0 * wide) * blur + (
+        2.1 * s * wide + _SPARE * U * (2.2 * t2 + 3.85 * s * s + 2.0)
+    )
+
+
+@lru_cache(maxsize=8)
+def make_quick(
+    raster: Raster, lights: tuple[Light, ...], unit: int, diffuse: tuple[float, float], background: Colour, flat: Colour
+) -> Quick:
+    """What the kernels have to know of a picture, whose diffuse colours are in that range; the two others are bytes.
+
+    It is not usable for a frame that is crooked, or where lights and colours are beyond single precision.
+    """
+    camera, shift = raster.camera, SAMPLINGS[raster.sampling]
+    focus = focal_length(camera.fov) * raster.whole_height / 2
+    across, up = (np.abs(ends).max() / focal_length(camera.fov) for ends in raster.ends())
+    rows, weight, farthest = [], 0.0, 0.0
+    for light in lights:
+        away = light_from_eye(light, camera, unit).tolist()
+        strength = max(map(abs, light.colour))
+        weight, farthest = weight + strength, max(farthest, hypot(*away))
+        place = (inner(*axis, *away) for axis in (camera.u, camera.v, camera.w))
+        rows.append([*place, *light.colour, strength, 0.0])
+    widest = 1.0 + (across + _BEYOND) ** 2 + (up + _BEYOND) ** 2
+    steep = 0.5 * (1.0 + widest) ** 2 / (_LEAST * (widest - 1.0 + _LEAST))
+    usable = bool(
+        _is_right(camera) and steep < _STEEPEST and 1.0 < focus < _LONGEST
+        and farthest < _FARTHEST and weight < _BRIGHTEST and diffuse[0] >= 0.0 and diffuse[1] < _BRIGHTEST
+    )  # fmt: skip
+    return Quick(
+        usable, camera.u, camera.v, camera.w, focus,
+        (raster.width - shift) / 2, (raster.whole_height - shift) / 2 - raster.first_row, steep, widest,
+        np.array(rows if usable else [], np.float32).reshape(-1),
+        weight, 5 * U * farthest, (16 + len(rows)) * U * weight, _packed(background), _packed(flat),
+    )  # fmt: skip
+
+
+def _is_right(camera: Camera) -> bool:
+    """Whether u, v, w are of length 1, and at right angles."""
+    axes = camera.u, camera.v, camera.w
+    return all(abs(inner(*a, *b) - float(a is b)) <= _CROOKED for a in axes for b in axes)
+
+
+def _packed(colour: Colour) -> int:
+    """Three bytes as one number, red the lowest."""
+    red, green, blue = (int(channel) for channel in colour)
+    return red | green << 8 | blue << 16

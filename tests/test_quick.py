@@ -1,0 +1,140 @@
+"""Single precision where it is certain: the bytes are float64's, and the bounds that say so hold."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from raytracer import backend, make_plan, plain
+from raytracer.bench import spread
+from raytracer.quick import U, coarseness_of, error_of, make_quick, near_of
+from raytracer.render import draw
+from raytracer.scene import Camera, Light, Materials, Scene, Spheres
+
+pytestmark = pytest.mark.skipif(backend.why_no_compiler() != "", reason="numba is not installed")
+KERNELS = backend.load()
+SIZE = 203, 150
+
+
+def some_scene(seed: int) -> Scene:
+    """Spheres ahead of a camera that is turned anyhow: from a hundredth of a pixel to a quarter of their distance."""
+    rng = np.random.default_rng(seed)
+    count, scale, fov = int(rng.choice([3, 40, 400])), 10.0 ** rng.uniform(-6, 6), float(rng.choice([2, 20, 60, 100]))
+    frame, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+    eye = rng.normal(size=3) * scale * rng.choice([0, 1, 1e4])
+    depth, wide = rng.uniform(1, 20, count), np.tan(np.radians(fov / 2))
+    across, up = rng.uniform(-1.5, 1.5, (2, count)) * wide * depth
+    radii = depth * wide * 10.0 ** rng.uniform(-4, -0.5, count)
+    centres = eye + scale * (np.column_stack([across, up, -depth]) @ frame)
+    table = np.zeros((5, 11))
+    table[:, :3], table[:, 9] = rng.uniform(0, rng.choice([0.3, 1.0, 4.0]), (5, 3)), 1.0
+    table[0, :3] = 0.0
+    spheres = Spheres(
+        scale * radii, centres, np.sort(rng.integers(0, 5, count)).astype(np.int32), np.arange(count, dtype=np.int32),
+        Materials(table),
+    )  # fmt: skip
+    camera = Camera(tuple(eye.tolist()), *(tuple(axis) for axis in frame.tolist()), fov)
+    return Scene(camera, (0.2, 0.1, 0.3), tuple(lights_near(spheres, scale, rng)), Materials(table), spheres)
+
+
+def lights_near(spheres: Spheres, scale: float, rng: np.random.Generator):
+    """Some far away, some just above a sphere."""
+    for _ in range(int(rng.choice([1, 2, 5]))):
+        i, away = rng.integers(len(spheres)), rng.normal(size=3)
+        up = spheres.radii[i] * (1 + 10.0 ** rng.uniform(-5, 0)) / np.linalg.norm(away)
+        place = rng.choice([spheres.centres[i] + up * away, 30 * scale * away])
+        yield Light(tuple(place.tolist()), tuple(rng.uniform(0, 1.5, 3).tolist()))
+
+
+def drawn(scene: Scene, stage: str, path, size=SIZE, **options):
+    return draw(replace(make_plan(scene, stage, *size, path=path), **options))
+
+
+@pytest.mark.parametrize("stage", ["hit", "diffuse"])
+@pytest.mark.parametrize("seed", range(30))
+def test_the_bytes_are_those_of_float64(seed, stage):
+    scene = some_scene(seed)
+    np.testing.assert_array_equal(drawn(scene, stage, KERNELS), drawn(scene, stage, plain))
+
+
+@pytest.mark.parametrize("sampling", ["corner", "centre"])
+@pytest.mark.parametrize("size", [(1, 1), (16, 4), (127, 31), (128, 32), (129, 33), (300, 65)], ids=str)
+def test_pictures_end_within_tiles_and_blocks(size, sampling):
+    scene = spread(300, seed=5)
+    found, expected = (draw(make_plan(scene, "diffuse", *size, sampling, path=path)) for path in (KERNELS, plain))
+    np.testing.assert_array_equal(found, expected)
+
+
+@pytest.mark.parametrize("spheres", [3000, 20_000])
+def test_a_tile_may_have_more_spheres_than_there_is_room_for(spheres):
+    scene = spread(spheres, seed=6)
+    found, expected = (drawn(scene, "diffuse", path, (60, 30)) for path in (KERNELS, plain))
+    np.testing.assert_array_equal(found, expected)
+
+
+def test_without_its_bounds_single_precision_is_wrong():
+    """So there is something to find for the tests above."""
+    scene = spread(5000, seed=7)
+    wrong = drawn(scene, "diffuse", KERNELS, (640, 360), unchecked=True) != drawn(scene, "diffuse", KERNELS, (640, 360))
+    assert 0 < wrong.any(axis=2).sum() < 640 * 360 // 100
+
+
+def quick_of(scene: Scene):
+    plan, diffuse = make_plan(scene, "diffuse", *SIZE), scene.materials.diffuse_range
+    return make_quick(plan.raster, plan.lights, 0, diffuse, (0.0, 0.0, 0.0), (1.0, 2.0, 3.0))
+
+
+def test_what_single_precision_is_not_for():
+    scene = spread(3)
+    light, camera = scene.lights[0], scene.camera
+    assert quick_of(scene).usable
+    assert quick_of(scene).flat == 1 + 2 * 256 + 3 * 65536
+    for other in (
+        replace(scene, camera=replace(camera, u=(1.0, 1e-9, 0.0))),
+        replace(scene, camera=replace(camera, v=(0.0, 2.0, 0.0))),
+        replace(scene, camera=replace(camera, fov=1e-4)),
+        replace(scene, camera=replace(camera, fov=179.0)),
+        replace(scene, lights=(replace(light, position=(1e11, 0.0, 0.0)),)),
+        replace(scene, lights=(replace(light, colour=(1e5, 0.0, 0.0)),)),
+        replace(scene, materials=Materials(np.full((64, 11), -0.5))),
+        replace(scene, materials=Materials(np.full((64, 11), 1e5))),
+    ):
+        assert not quick_of(other).usable
+
+
+def spheres_and_pixels(count: int, rng: np.random.Generator):
+    """U, V, ρ and 1 / w of some spheres; and where some pixels are, in pixels from their middles, most of them near."""
+    u, v = rng.uniform(-1.1, 1.1, count), rng.uniform(-0.6, 0.6, count)
+    rho, size = 10.0 ** rng.uniform(-5, np.log10(0.25), count), 10.0 ** rng.uniform(-1.5, 2.5, count)
+    x, y = rng.uniform(-1.2, 1.2, (2, count)) * size * np.sqrt(1 + u * u + v * v)
+    return u, v, rho, 1 / size, x, y
+
+
+def test_the_discriminant_is_no_further_off_than_its_bound():
+    """In numpy's single precision, which rounds products, too; x and y are rounded as a tile's are."""
+    rng = np.random.default_rng(8)
+    u, v, rho, blur, x, y = spheres_and_pixels(400_000, rng)
+    m, one = 1 + u * u + v * v, np.float32
+    pixel = rho * blur  # 1 / f
+    exact = [m, 2 * u * pixel, -2 * v * pixel, (1 + v * v - rho**2) * blur**2, 2 * u * v * blur**2]
+    exact.append((1 + u * u - rho**2) * blur**2)
+    near = np.round(x), np.round(y)  # whole columns and rows, and the rest of the sphere's middle
+    rest = near[0] - x, near[1] - y
+    rough_x, rough_y = (
+        one(whole % 4) - one(part) + one(whole - whole % 4) for whole, part in zip(near, rest, strict=True)
+    )
+    found, true = ((c[0] + b * (c[2] - b * c[5])) + a * ((c[1] - b * c[4]) - a * c[3]) for a, b, c in (
+        (rough_x, rough_y, [one(number) for number in exact]), (x, y, exact)))  # fmt: skip
+    hit = np.abs(true) < m
+    steep = 2 * (1 + v * v) * (1 + u * u) / (1 - rho**2) / (m - rho**2)
+    part = (np.abs(found - true) / (error_of(steep, rho, blur) * m))[hit]
+    assert 0.02 < part.max() < 1.0
+
+
+def test_what_the_bounds_grow_with():
+    few, many = np.float64(0.01), np.float64(10.0)
+    assert U < error_of(2.0, few, few) < error_of(2.0, few, many) < error_of(4.0, few, many)
+    assert U < coarseness_of(few, 1.2, 900.0) < coarseness_of(many, 1.2, 900.0) < coarseness_of(many, 1.6, 900.0)
+    assert near_of(few, U) < near_of(10 * few, U) < near_of(10 * few, 100 * U)
+    for error in 2.0 ** np.arange(-24.0, -10.0):  # twice the sum that the text derives
+        assert near_of(0.1, error) >= 2 * (2.5 * 0.1 * (np.sqrt(error) / 4 + 8 * U) + 24 * U)
