@@ -28,11 +28,11 @@ are left to float64, too. s is below 2ac / ((1 − ρ²)(m − ρ²)), which for
 
 **What colour it has.** In pixels, with D = (u, v, −f), the hit is at n = δ + τD from the sphere's middle, where
 δ = (x, y, 0), τ = −(g + √(g² − a(w² − δ²))) / a, g = δ·D, a = D·D. Let s² be the largest a/f² of a pixel of the tile,
-and t² = s² − 1; then |δ| ≤ 1.05sw. u and v are exact; x and y count from the middle of a tile, up to 64 and 16, so δ is
-off by √2ηw, η = u(47/w + 2.1s); f and w are rounded once. So g is off by √a·w(1.42η + 2.1tu), the root's argument by
+and t² = s² − 1; then |δ| ≤ 1.05sw. u and v are exact, X and Y rounded once, x and y too; so δ is off by √2ηw,
+η = u(0.71(|X| + |Y|)/w + 0.75s); f and w are rounded once. So g is off by √a·w(1.42η + 2.1tu), the root's argument by
 aw²·2c₁, and n by w·q, where cos is the root by its largest value and
 
-    q = c₀ + c₁/cos < c₁(1.9 + 1/cos),  c₁ = 1.5(s + t)η + (2.2t² + 3.85s² + 2)u,  c₀ = 2.84η + (7.4t + 6.5)u
+    q = c₀ + c₁/cos,  c₁ = 1.5(s + t)η + (2.2t² + 3.85s² + 2)u,  c₀ = 2.84η + (7.4t + 6.5)u
 
 as long as cos² > 16c₁. (What float64 itself leaves of the error of its k, 2⁻²⁶ at most, is below 2⁻⁵²/(ρ² cos), and
 added to c₁.) The point P is off by r·q and by 4u|P|, the light's place by u of itself; so the direction towards it by
@@ -82,13 +82,19 @@ def near_of(rho: Number, error: Number) -> Number:
     return 2.1 * (2.5 * rho * ((error / _ROOT + _ROOT) * 0.125 + 8.0 * U) + 24.0 * U)
 
 
-def coarseness_of(blur: Number, s: float, focus: float) -> Number:
-    """c₁, for 1 / w, s and f."""
+def flatness_of(s: float) -> float:
+    """c₀ / c₁, at most."""
+    t2 = s * s - 1.0
+    t = np.sqrt(t2)
+    return float(max(2.84 / (1.5 * (s + t)), (7.4 * t + 6.5) / (2.2 * t2 + 3.85 * s * s + 2.0)))
+
+
+def coarseness_of(away: Number, blur: Number, s: float, focus: float) -> Number:
+    """c₁, for |X| + |Y|, 1 / w, s and f."""
     t2 = s * s - 1.0
     wide = _SPARE * U * 1.5 * (s + np.sqrt(t2))
-    return (2.0**-52 * focus * focus * blur + 47.0 * wide) * blur + (
-        2.1 * s * wide + _SPARE * U * (2.2 * t2 + 3.85 * s * s + 2.0)
-    )
+    rest = 0.75 * s * wide + _SPARE * U * (2.2 * t2 + 3.85 * s * s + 2.0)
+    return (2.0**-52 * focus * focus * blur + 0.71 * wide * away) * blur + rest
 
 
 @lru_cache(maxsize=8)

@@ -7,7 +7,7 @@ import pytest
 
 from raytracer import backend, make_plan, plain
 from raytracer.bench import spread
-from raytracer.quick import U, coarseness_of, error_of, make_quick, near_of
+from raytracer.quick import U, coarseness_of, error_of, flatness_of, make_quick, near_of
 from raytracer.render import draw
 from raytracer.scene import Camera, Light, Materials, Scene, Spheres
 
@@ -134,7 +134,9 @@ def test_the_discriminant_is_no_further_off_than_its_bound():
 def test_what_the_bounds_grow_with():
     few, many = np.float64(0.01), np.float64(10.0)
     assert U < error_of(2.0, few, few) < error_of(2.0, few, many) < error_of(4.0, few, many)
-    assert U < coarseness_of(few, 1.2, 900.0) < coarseness_of(many, 1.2, 900.0) < coarseness_of(many, 1.6, 900.0)
+    coarse = [coarseness_of(*numbers, 900.0) for numbers in ((few, few, 1.2), (few, many, 1.2), (many, many, 1.2))]
+    assert U < coarse[0] < coarse[1] < coarse[2] < coarseness_of(many, many, 1.6, 900.0)
+    assert 1.0 < flatness_of(1.6) < flatness_of(1.2) < 2.0
     assert near_of(few, U) < near_of(10 * few, U) < near_of(10 * few, 100 * U)
     for error in 2.0 ** np.arange(-24.0, -10.0):  # twice the sum that the text derives
         assert near_of(0.1, error) >= 2 * (2.5 * 0.1 * (np.sqrt(error) / 4 + 8 * U) + 24 * U)

@@ -56,7 +56,7 @@ from raytracer.kernels.sixteen import (
 )
 from raytracer.kernels.surfaces import diffuse_at, meet_spheres
 from raytracer.kernels.visibility import AHEAD, corners_of, fetch, holds, sphere_of
-from raytracer.quick import ONE_BYTE, coarseness_of, error_of, near_of
+from raytracer.quick import ONE_BYTE, coarseness_of, error_of, flatness_of, near_of
 from raytracer.shading import to_byte
 
 MOST = 1 << 12  # spheres of a tile's list; of more, the table would leave the core's caches
@@ -70,7 +70,7 @@ _HALF, _UNIT, _ZERO, _STEP = np.float32(0.5), np.float32(1.0), np.float32(0.0), 
 _DARKEST, _BRIGHTEST = np.float32(0.5 * ONE_BYTE), np.float32(255.5 * ONE_BYTE)
 _MASK = np.int32(ONE_BYTE - 1)
 _HOPELESS = np.float32(2.0**-8)  # an error of which no byte is certain
-_FLAT, _SPARE = np.float32(1.9), np.float32(4.0)  # see `quick`: c₀ / c₁, and what roundings at the end add
+_SPARE = np.float32(4.0)  # parts of a byte: what roundings at the end add
 _NEAR, _COARSE = np.uint64(120), np.uint64(128)  # where of the batch these are
 _SMALLEST, _LARGEST = 1e-10, 1e10  # depths that single precision can square
 
@@ -84,6 +84,7 @@ def _paint_tile(view, slow, bins, tile, scratch, doubts, paints, out):
         return False
     coarsest = draw_all(view, bins, first, end, tile, paints, sheet)
     if coarsest < 0.0:
+        sheet.doubt[:] = 0
         return False
     if certain:
         _decide(view, bins, tile, sheet, doubts)
@@ -150,7 +151,8 @@ def _look(view, bins, at, row, tile, s, paints, sheet):
     store_halves(batch, 112, 4.0 * error * m)
     store_halves(batch, _NEAR, near_of(rho, error))
     if shades:
-        coarse, scale = coarseness_of(blur, s, quick.focus), (255.0 * ONE_BYTE) * blur
+        away, scale = abs(middle_x) + abs(middle_y), (255.0 * ONE_BYTE) * blur
+        coarse = coarseness_of(away, blur, s, quick.focus)
         store_halves(batch, _COARSE, coarse)
         red, green, blue, _ = gather_rows(paints.colours, gather(view.material, where))
         store_table(
@@ -281,12 +283,13 @@ def _shade(tile, line, coarsest, quick, sheet, close):
     y = both(rows_of_block()) + np.float32(SIDE * line)
     v, y = np.float32(quick.middle_y - tile.top) - y, y - _MIDDLE_Y
     left, longest = np.float32(tile.left - quick.middle_x), _longest(quick, tile)
-    rim, longest = np.float32(16.0 * longest * longest * coarsest), np.float32(longest)
+    flat, rim = np.float32(flatness_of(longest / quick.focus)), np.float32(16.0 * longest * longest * coarsest)
+    longest = np.float32(longest)
     for k in range(np.uint64(0), np.uint64(count), np.uint64(2)):
         one, other = np.uint64(sheet.blocks[k]), np.uint64(sheet.blocks[k + _ONE])
         x = both(columns_of_block()) + two(np.float32(np.int64(one) * SIDE), np.float32(np.int64(other) * SIDE))
         p, q = start + one * _SIXTEEN, start + other * _SIXTEEN
-        red, green, blue, error, none = _light(quick, sheet, p, q, x - _MIDDLE, y, x + left, v, longest, rim)
+        red, green, blue, error, none = _light(quick, sheet, p, q, x - _MIDDLE, y, x + left, v, longest, rim, flat)
         colour, hit = red >> 16 | (green >> 8 & 0xFF00) | (blue & 0xFF0000), load_two(sheet.number, p, q) > 0
         store_two(sheet.colour, one * _SIXTEEN, other * _SIXTEEN, blend(hit, colour, quick.background))
         if certain:
@@ -314,7 +317,7 @@ def _longest(quick, tile):
 
 
 @inlined
-def _light(quick, sheet, p, q, x, y, u, v, longest, rim):
+def _light(quick, sheet, p, q, x, y, u, v, longest, rim, flat):
     """Three channels of two blocks of pixels, in parts of a byte, bounds of their errors, and where there are none.
 
     x and y count from the middle of the tile, u and v from the middle of the picture: the ray is (u, v, −focus).
@@ -341,11 +344,12 @@ def _light(quick, sheet, p, q, x, y, u, v, longest, rim):
         green = times_plus(shine, light[i + np.uint64(4)], green)
         blue = times_plus(shine, light[i + np.uint64(5)], blue)
         nearness = times_plus(length, light[i + np.uint64(6)], nearness)
-    off = times_plus(rough * size, longest, _FLAT) * coarse
+    off = times_plus(rough * size, longest, flat) * coarse
     error = times_plus(nearness, np.float32(quick.far), np.float32(quick.rounding))
     error = times_plus(times_plus(nearness, unit * size, np.float32(quick.weight)), off, error)
     none, error = ~((disc > size2 * rim) & (error <= _HOPELESS)), error * size
-    return _parts(red, r), _parts(green, g), _parts(blue, b), (error * r, error * g, error * b), none
+    errors = times_plus(error, r, _SPARE), times_plus(error, g, _SPARE), times_plus(error, b, _SPARE)
+    return _parts(red, r), _parts(green, g), _parts(blue, b), errors, none
 
 
 @inlined
@@ -358,7 +362,7 @@ def _parts(light, colour):
 @inlined
 def _is_close(channel, error):
     """Where a channel is so close to the border of two bytes that its error may reach beyond."""
-    error = whole_numbers(error + _SPARE)
+    error = whole_numbers(error)
     return (channel + error & _MASK) <= error + error
 
 
