@@ -12,6 +12,7 @@ if not backend.why_no_compiler():
     import raytracer.kernels  # noqa: F401 (brings select for lanes)
     from raytracer import twofold
     from raytracer.kernels import lanes as k
+    from raytracer.kernels import sixteen as s
     from raytracer.kernels.cells import spot_of
     from raytracer.kernels.compiler import borrowing
 
@@ -173,3 +174,97 @@ def lane_numbers_of():
     out = np.empty(8, np.int32)
     run(out)
     return out.tolist()
+
+
+X = (np.arange(16, dtype=np.float32) - 5) / np.float32(3)
+Y = np.float32(2.0) ** np.arange(-8, 8, dtype=np.float32)
+
+
+@pytest.mark.parametrize("symbol", [operator.add, operator.sub, operator.mul, operator.truediv])
+def test_arithmetic_of_singles_and_of_pairs(symbol):
+    @borrowing
+    def run(x, y, out):
+        k.store(out, 0, symbol(k.load(x, 0), k.load(y, 0)))
+        pair = symbol(s.both(k.load(x, 0)), s.two(np.float32(2.0), np.float32(3.0)))
+        k.store_pair(out, np.uint64(16), np.uint64(32), -abs(pair))
+
+    out = np.empty(48, np.float32)
+    run(X, Y, out)
+    expected = [symbol(X, Y), -abs(symbol(X, np.float32(2))), -abs(symbol(X, np.float32(3)))]
+    np.testing.assert_array_equal(out, np.concatenate(expected))
+
+
+def test_rough_inverses_and_roots():
+    @borrowing
+    def run(y, out):
+        k.store(out, 0, s.rough_inverse(k.load(y, 0)))
+        k.store(out, np.uint64(16), s.rough_inverse_root(k.load(y, 0)))
+        pair = s.rough_inverse_root(s.both(k.load(y, 0)) * s.two(np.float32(3.0), np.float32(-1.0)))
+        k.store_pair(out, np.uint64(32), np.uint64(48), pair)
+        k.store(out, np.uint64(64), s.times_plus(k.load(y, 0), k.load(y, 0), 1.0))
+
+    out = np.empty(80, np.float32)
+    run(Y, out)
+    wide = Y.astype(np.float64)
+    for found, true in ((out[:16], 1 / wide), (out[16:32], wide**-0.5), (out[32:48], (3 * wide) ** -0.5)):
+        assert (abs(found / true - 1) < 2.0**-14).all()
+    assert np.isnan(out[48:64]).all()
+    np.testing.assert_allclose(out[64:], wide * wide + 1, rtol=2.0**-23)
+
+
+def test_choices_marks_and_numbers():
+    @borrowing
+    def run(x, y, numbers, out, found):
+        less, most = s.lesser(k.load(x, 0), k.load(y, 0)), s.greater(k.load(x, 0), np.float32(1.0))
+        k.store(out, 0, k.blend(less < k.load(y, 0), less, most))
+        k.store(found, 0, s.lesser_number(s.load_numbers(numbers, 0) & 7, s.sixteen(5)) << 2 | 1)
+        k.store(found, np.uint64(16), s.whole_numbers(k.load(y, 0)))
+        pair = s.load_two(numbers, np.uint64(16), np.uint64(0))
+        k.store_pair(found, np.uint64(32), np.uint64(48), pair >> 1)
+        return k.bits_of(pair > 20), s.lowest_bit(np.int32(40)), k.any_of(pair > 40)
+
+    out, numbers, found = np.empty(16, np.float32), np.arange(32, dtype=np.int32), np.empty(64, np.int32)
+    bits, lowest, some = run(X, Y, numbers, out, found)
+    less = np.minimum(X, Y)
+    np.testing.assert_array_equal(out, np.where(less < Y, less, np.maximum(X, 1)))
+    expected = [np.minimum(numbers[:16] & 7, 5) * 4 + 1, Y.astype(np.int32), numbers[16:] >> 1, numbers[:16] >> 1]
+    np.testing.assert_array_equal(found, np.concatenate(expected))
+    assert (bits, lowest, some) == (0b1111111111100000, 3, False)
+
+
+def test_a_table_of_eight_columns():
+    @borrowing
+    def run(columns, numbers, table, out):
+        c = columns
+        s.store_table(
+            table, np.uint64(1), k.load(c, 0), k.load(c, np.uint64(8)), k.load(c, np.uint64(16)),
+            k.load(c, np.uint64(24)), k.load(c, np.uint64(32)), k.load(c, np.uint64(40)), k.load(c, np.uint64(48)),
+            k.load(c, np.uint64(56)),
+        )  # fmt: skip
+        found = s.gather_eight(table, numbers, np.uint64(0), np.uint64(16))
+        for i in range(8):
+            k.store_pair(out, np.uint64(32 * i), np.uint64(32 * i + 16), found[i])
+        s.store_halves(out, np.uint64(256), k.load(c, 0))
+
+    rng = np.random.default_rng(1)
+    columns, table = rng.normal(size=(8, 8)), np.zeros((9, 8), np.float32)
+    numbers, out = rng.integers(0, 9, 32).astype(np.int32), np.empty(264, np.float32)
+    run(columns.reshape(-1), numbers, table.reshape(-1), out)
+    np.testing.assert_array_equal(table[1:], columns.T.astype(np.float32))
+    np.testing.assert_array_equal(out[:256].reshape(8, 32), table[numbers].T)
+    np.testing.assert_array_equal(out[256:], columns[0].astype(np.float32))
+
+
+@pytest.mark.parametrize("step", [3, 4])
+def test_a_row_of_four_blocks_as_bytes(step):
+    @borrowing
+    def run(picture, step, colours):
+        s.put_sixteen(picture, np.uint64(step), np.uint64(step), colours, np.uint64(4))
+
+    rng = np.random.default_rng(2)
+    colours = rng.integers(0, 1 << 24, (4, 4, 4), dtype=np.int32)  # block, row, column
+    picture = np.full((18, step), 7, np.uint8)
+    run(picture.reshape(-1), step, colours.reshape(-1))
+    expected = np.full((18, step), 7, np.uint8)
+    expected[1:17, :3] = colours[:, 1].reshape(-1)[:, None] >> np.array([0, 8, 16]) & 255
+    np.testing.assert_array_equal(picture, expected)

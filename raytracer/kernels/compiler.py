@@ -16,11 +16,10 @@ from functools import partial
 from types import FunctionType, ModuleType
 
 import numba
-from llvmlite.binding import get_host_cpu_features
 from numba.extending import overload, register_jitable
 
 from raytracer import bounce, boxes, camera, certified, facets, machine_code, methods, quick, shading, twofold
-from raytracer.kernels.lanes import MarkPairs, Marks, Mask, blend, fused
+from raytracer.kernels.lanes import PROCESSOR, MarkPairs, Marks, Mask, blend, fused
 
 
 @overload(twofold.select)
@@ -30,7 +29,7 @@ def _select(condition, yes, no):
     return lambda condition, yes, no: yes if condition else no
 
 
-if get_host_cpu_features().get("fma"):  # else a fused operation is a slow call, and not on every system there
+if PROCESSOR.get("fma"):  # else a fused operation is a slow call, and not on every system there
 
     @overload(twofold.two_product)
     def _two_product(a, b):
@@ -61,7 +60,7 @@ def _compile_calls_into(module: ModuleType) -> None:
 
 _SOURCES = (twofold, certified, camera, boxes, facets, shading, bounce, methods, quick)
 _OVERLOADED = (twofold.select, twofold.exponent, twofold.scale)
-if get_host_cpu_features().get("fma"):
+if PROCESSOR.get("fma"):
     _OVERLOADED += (twofold.two_product,)
 for _module in _SOURCES:
     _compile_calls_into(_module)

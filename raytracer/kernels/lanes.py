@@ -7,9 +7,11 @@ and it does not say when it gives up. The formulas of `certified`, plain arithme
     Lanes    <8 x double>   + − × ÷, −x, abs, sqrt, floor, ceil, comparisons; a number beside lanes counts eight times
     Mask     <8 x i1>       & | ~; any_of, all_of, bits_of; `select(mask, lanes, lanes)`
     Places   <8 x i32>      eight int32
-    Singles  <16 x float>   + − ×, −x, abs, comparisons; see `sixteen`
+    Singles  <16 x float>   + − × ÷, −x, abs, comparisons; see `sixteen`
     Marks    <16 x i1>      as a mask
     Numbers  <16 x i32>     + & | << >>, comparisons
+
+    SinglePairs, MarkPairs, NumberPairs   two of these, so that the processor has two independent things to do
 
 Arrays are one-dimensional and contiguous; nothing checks their ends.
 """
@@ -18,6 +20,8 @@ import operator
 
 import numpy as np
 from llvmlite import ir
+from llvmlite.binding import get_host_cpu_features
+from numba import config
 from numba.core import types
 from numba.core.cgutils import get_or_insert_function
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
@@ -25,46 +29,33 @@ from numba.extending import intrinsic, lower_builtin, lower_cast, models, regist
 
 WIDTH, SIXTEEN = 8, 16
 
+# What the processor can do, unless numba is told to compile for another one.
+PROCESSOR = {} if config.CPU_NAME or config.CPU_FEATURES else dict(get_host_cpu_features())
+
 _DOUBLE, _FLOAT, _INT32, _BYTE, _BIT = ir.DoubleType(), ir.FloatType(), ir.IntType(32), ir.IntType(8), ir.IntType(1)
 _FOUR = 4  # numbers of a row of a table
 
 
-class Lanes(types.Type):
-    vector, single = ir.VectorType(_DOUBLE, WIDTH), types.float64
+def _kind(name, element, width, single):
+    """A class of vectors, which has one type; `single` is the number that may stand beside them."""
+    return type(name, (types.Type,), {"vector": ir.VectorType(element, width), "single": single})
 
 
-class Mask(types.Type):
-    vector, single = ir.VectorType(_BIT, WIDTH), types.boolean
-
-
-class Places(types.Type):
-    vector, single = ir.VectorType(_INT32, WIDTH), types.int32
-
-
-class Singles(types.Type):
-    vector, single = ir.VectorType(_FLOAT, SIXTEEN), types.float32
-
-
-class Marks(types.Type):
-    vector, single = ir.VectorType(_BIT, SIXTEEN), types.boolean
-
-
-class Numbers(types.Type):
-    vector, single = ir.VectorType(_INT32, SIXTEEN), types.int32
-
-
-class SinglePairs(types.Type):
-    vector, single = ir.VectorType(_FLOAT, 2 * SIXTEEN), types.float32
-
-
-class MarkPairs(types.Type):
-    vector, single = ir.VectorType(_BIT, 2 * SIXTEEN), types.boolean
-
-
-class NumberPairs(types.Type):
-    vector, single = ir.VectorType(_INT32, 2 * SIXTEEN), types.int32
-
-
+Lanes, Singles, SinglePairs = (
+    _kind("Lanes", _DOUBLE, WIDTH, types.float64),
+    _kind("Singles", _FLOAT, SIXTEEN, types.float32),
+    _kind("SinglePairs", _FLOAT, 2 * SIXTEEN, types.float32),
+)
+Mask, Marks, MarkPairs = (
+    _kind("Mask", _BIT, WIDTH, types.boolean),
+    _kind("Marks", _BIT, SIXTEEN, types.boolean),
+    _kind("MarkPairs", _BIT, 2 * SIXTEEN, types.boolean),
+)
+Places, Numbers, NumberPairs = (
+    _kind("Places", _INT32, WIDTH, types.int32),
+    _kind("Numbers", _INT32, SIXTEEN, types.int32),
+    _kind("NumberPairs", _INT32, 2 * SIXTEEN, types.int32),
+)
 LANES, MASK, PLACES = Lanes("lanes"), Mask("mask"), Places("places")
 SINGLES, MARKS, NUMBERS = Singles("singles"), Marks("marks"), Numbers("numbers")
 SINGLE_PAIRS, MARK_PAIRS, NUMBER_PAIRS = (
@@ -434,11 +425,13 @@ def load_low(typing, array, i):
 @intrinsic
 def load_pair(typing, array, i, j):
     """Four numbers of an array from element i on, and four from j on: lanes of float64, places of int32."""
-    kind = PLACES if array.dtype == types.int32 else LANES
+    return _load_halves(array, PLACES if array.dtype == types.int32 else LANES)
 
+
+def _load_halves(array, kind):
     def lower(context, builder, sig, args):
         array, *starts = args
-        half = ir.VectorType(kind.vector.element, WIDTH // 2)
+        half = ir.VectorType(kind.vector.element, kind.vector.count // 2)
         addresses = [_address(context, builder, sig.args[0], array, start, half) for start in starts]
         return _joined(builder, [builder.load(address, align=4) for address in addresses])
 
@@ -447,11 +440,11 @@ def load_pair(typing, array, i, j):
 
 @intrinsic
 def store_pair(typing, array, i, j, value):
-    """Put four lanes or places into an array from element i on, and the other four from j on."""
+    """Put one half of a vector into an array from element i on, the other from j on."""
 
     def lower(context, builder, sig, args):
         array, *starts, value = args
-        half = WIDTH // 2
+        half = value.type.count // 2
         for lane, start in zip((0, half), starts, strict=True):
             part = builder.shuffle_vector(value, value, _order(range(lane, lane + half)))
             builder.store(part, _address(context, builder, sig.args[0], array, start, part.type), align=4)

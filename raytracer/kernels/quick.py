@@ -30,6 +30,7 @@ from raytracer.kernels.lanes import (
     load_low,
     spread,
     store,
+    store_pair,
     whole,
 )
 from raytracer.kernels.sixteen import (
@@ -49,7 +50,6 @@ from raytracer.kernels.sixteen import (
     sixteen,
     store_halves,
     store_table,
-    store_two,
     times_plus,
     two,
     whole_numbers,
@@ -291,7 +291,7 @@ def _shade(tile, line, coarsest, quick, sheet, close):
         p, q = start + one * _SIXTEEN, start + other * _SIXTEEN
         red, green, blue, error, none = _light(quick, sheet, p, q, x - _MIDDLE, y, x + left, v, longest, rim, flat)
         colour, hit = red >> 16 | (green >> 8 & 0xFF00) | (blue & 0xFF0000), load_two(sheet.number, p, q) > 0
-        store_two(sheet.colour, one * _SIXTEEN, other * _SIXTEEN, blend(hit, colour, quick.background))
+        store_pair(sheet.colour, one * _SIXTEEN, other * _SIXTEEN, blend(hit, colour, quick.background))
         if certain:
             bits = bits_of(
                 hit & (none | _is_close(red, error[0]) | _is_close(green, error[1]) | _is_close(blue, error[2]))

@@ -7,7 +7,6 @@
 """
 
 from llvmlite import ir
-from llvmlite.binding import get_host_cpu_features
 from numba.core import types
 from numba.core.cgutils import get_or_insert_function
 from numba.extending import intrinsic
@@ -18,6 +17,7 @@ from raytracer.kernels.lanes import (
     LANES,
     NUMBER_PAIRS,
     NUMBERS,
+    PROCESSOR,
     SINGLE_PAIRS,
     SINGLES,
     SIXTEEN,
@@ -25,6 +25,7 @@ from raytracer.kernels.lanes import (
     _address,
     _joined,
     _load,
+    _load_halves,
     _order,
     _spread,
     _suffix,
@@ -33,7 +34,6 @@ from raytracer.kernels.lanes import (
 SIDE = 4
 _FLOAT, _INT32, _INT64, _BIT, _BYTE = ir.FloatType(), ir.IntType(32), ir.IntType(64), ir.IntType(1), ir.IntType(8)
 _COLUMNS = 2 * SIDE  # numbers of a row of a table
-_PROCESSOR = get_host_cpu_features()
 
 
 def _first(kinds, *args):
@@ -48,7 +48,7 @@ def times_plus(typing, a, b, c):
 
     def lower(context, builder, sig, args):
         a, b, c = args
-        if not _PROCESSOR.get("fma"):
+        if not PROCESSOR.get("fma"):
             return builder.fadd(builder.fmul(a, b), c)
         function = ir.FunctionType(c.type, [c.type] * 3)
         return builder.call(get_or_insert_function(builder.module, function, "llvm.fma" + _suffix(c.type)), args)
@@ -61,7 +61,7 @@ def _estimate(instruction, exactly):
 
     def lower(context, builder, sig, args):
         (x,) = args
-        if not _PROCESSOR.get("avx512f"):
+        if not PROCESSOR.get("avx512f"):
             return exactly(builder, x)
         bits = ir.IntType(SIXTEEN)
         vector = SINGLES.vector
@@ -222,30 +222,8 @@ def _turned(builder, columns):
 
 @intrinsic
 def load_two(typing, array, i, j):
-    """Sixteen numbers of an array from element i on, and sixteen from j on."""
-    kind = {types.int32: NUMBER_PAIRS, types.float32: SINGLE_PAIRS}[array.dtype]
-
-    def lower(context, builder, sig, args):
-        array, *starts = args
-        vector = ir.VectorType(kind.vector.element, SIXTEEN)
-        addresses = [_address(context, builder, sig.args[0], array, start, vector) for start in starts]
-        return _joined(builder, [builder.load(address, align=4) for address in addresses])
-
-    return kind(array, types.uint64, types.uint64), lower
-
-
-@intrinsic
-def store_two(typing, array, i, j, value):
-    """Put one half into an array from element i on, the other from j on."""
-
-    def lower(context, builder, sig, args):
-        array, *starts, value = args
-        for k, start in enumerate(starts):
-            part = _part(builder, value, SIXTEEN * k)
-            builder.store(part, _address(context, builder, sig.args[0], array, start, part.type), align=4)
-        return context.get_dummy_value()
-
-    return types.void(array, types.uint64, types.uint64, value), lower
+    """Sixteen int32 of an array from element i on, and sixteen from j on."""
+    return _load_halves(array, NUMBER_PAIRS)
 
 
 @intrinsic
