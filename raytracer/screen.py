@@ -6,8 +6,9 @@ Eye rays share their origin, so a sphere covers an ellipse on the screen, and on
     begin, fill the list of each tile
     paint       a tile at a time: a small depth buffer, then colours, while all of it is in the core's first cache
 
-No tree, no ray objects, nothing normalised, and only one square root for a pixel and a sphere. Pixels of which float64
-is not certain are listed, decided by `settle`, and painted anew.
+No tree, no ray objects, nothing normalised, and only one square root for a pixel and a sphere. A tile with nothing but
+small spheres is painted in single precision (`quick`), with float64 for what that is not certain of. Pixels of which
+float64 is not certain are listed, decided by `settle`, and painted anew.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 """Tiles to pixels: what a tile's depth buffer holds becomes colours, or hits, or nothing but a background.
 
     boxes, lists ─ see_tile ─> k, index ─ a painter ─> bytes of a picture, or t and index of hits
+                └─ paint_quickly, for tiles of small spheres ─> bytes (see `kernels.quick`)
 
 A painter does one tile, a row at a time, eight pixels at a time. Doubtful pixels are listed, and painted all the same:
 whoever called decides them and paints them anew.
