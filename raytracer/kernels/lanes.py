@@ -38,7 +38,10 @@ _FOUR = 4  # numbers of a row of a table
 
 def _kind(name, element, width, single):
     """A class of vectors, which has one type; `single` is the number that may stand beside them."""
-    return type(name, (types.Type,), {"vector": ir.VectorType(element, width), "single": single})
+    # kept machine code names classes by their modules
+    return type(
+        name, (types.Type,), {"vector": ir.VectorType(element, width), "single": single, "__module__": __name__}
+    )
 
 
 Lanes, Singles, SinglePairs = (
