@@ -197,6 +197,7 @@ class Tree(NamedTuple):
 # ------------------------------------------------------------------------------------ what `raytracer.screen` shares
 
 
+APART = 16  # int64 from what one thread counts to what another does
 FACET = 24  # numbers a triangle, of which some are to spare
 CELL_BITS = 7  # a cell of `Cells` is at most 2**7 pixels wide and high
 CORNERS = 12  # numbers a triangle at the stage `full`: its corners, how far away they are, and some to spare
@@ -262,7 +263,7 @@ class Tiles(NamedTuple):
     places far from each other, and at the next picture to the same ones again, which their core may still hold.
     """
 
-    next: np.ndarray  # int64 (runs,), how many have been taken of each run
+    next: np.ndarray  # int64 (runs · APART,), how many have been taken of each run, each in a cache line of its own
     first: int
     last: int  # excluded
     own: int  # the run of the thread that asks

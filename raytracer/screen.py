@@ -25,6 +25,7 @@ from numpy.lib.stride_tricks import as_strided
 
 from raytracer import plain
 from raytracer.arrays import (
+    APART,
     CORNERS,
     FACET,
     Bins,
@@ -156,7 +157,7 @@ class Screen(NamedTuple):
         height, across = self.kernels.TILE_HEIGHT, self.bins.columns
         first, count = rows.start // height * across, -(-(rows.stop - rows.start) // height) * across
         start, stop, _ = columns.indices(count)
-        return Tiles(np.zeros(len(self.desks), np.int64), first + start, first + stop, 0)
+        return Tiles(np.zeros(APART * len(self.desks), np.int64), first + start, first + stop, 0)
 
     def hits(self, rows: slice, worker: int = 0, polished: bool = False) -> Hits:
         """What the rays of these rows, cut between tiles, hit first: as `Eye.hits`."""
@@ -227,7 +228,7 @@ class Screen(NamedTuple):
         What is left of them `doubtful` tells.
         """
         kernel, (scratch, doubts) = getattr(self.kernels, painter), self.desks[worker]
-        tiles = tiles._replace(own=worker % len(tiles.next))
+        tiles = tiles._replace(own=worker % len(self.desks))
         while not kernel(self.view, self.slow, self.bins, tiles, scratch, doubts, paints, out):
             yield from self.doubtful(worker)
 

@@ -9,7 +9,7 @@ whoever called decides them and paints them anew.
 
 import numpy as np
 
-from raytracer.arrays import Tile
+from raytracer.arrays import APART, Tile
 from raytracer.certified import fine_direction, refine
 from raytracer.kernels.bounds import TILE_HEIGHT, TILE_WIDTH
 from raytracer.kernels.compiler import borrowing, inlined, variant
@@ -65,12 +65,12 @@ def _paint(view, slow, bins, tiles, scratch, doubts, paints, out):
 @borrowing
 def _take(tiles):
     """The number of a tile that nobody has taken, −1 if there is none."""
-    runs = len(tiles.next)
+    runs = len(tiles.next) // APART
     length = (tiles.last - tiles.first + runs - 1) // runs
     for turn in range(runs):
         run = (tiles.own + turn) % runs
         start = tiles.first + run * length
-        number = start + take_number(tiles.next, np.uint64(run))
+        number = start + take_number(tiles.next, np.uint64(run * APART))
         if number < min(start + length, tiles.last):
             return number
     return -1
