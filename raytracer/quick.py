@@ -7,34 +7,34 @@ float64 is sure to say the same: the picture is float64's, byte for byte.
 
 Everything is counted in pixels from the middle of a tile, where whole numbers are exact, and a sphere is seen where its
 centre is, at (X, Y), w = f·ρ pixels large, f the focal length in pixels and ρ the radius by the depth z of the centre.
-With x, y from there, and (U, V, −1) the centre's ray, m = 1 + U² + V², a ray D = (u, v, −f)/f meets the sphere where
-the discriminant, divided by r²,
+With x, y from there, to the right and down, (U, V, −1) the centre's ray and m = 1 + U² + V², a ray meets the sphere
+where the discriminant, divided by r²,
 
     disc = m + e₁x + e₂y − (a x² + b xy + c y²) / w²,  a = 1 + V² − ρ²,  b = 2UV,  c = 1 + U² − ρ²,
 
 is above 0: a quadratic form about the sphere's own middle, in which nothing cancels (h² − a·c of `certified` does, the
-more the smaller a sphere is). k = D·D·t = z(m + (Ux + Vy)/f) − r√disc.
+more the smaller a sphere is). k = D·D·t = z(m + (Ux − Vy)/f) − r√disc.
 
 **Whether a pixel is hit.** u = 2⁻²⁴. By m, let T be (a x² + c y²) / w², and s = 1/(1 − θ) with θ = |UV| / √(ac), so
 that the whole form is at least T/s; where disc is near 0, T ≤ s(1.05 + 16ρ) for ρ ≤ ¼ and s ≤ 8. Coefficients are
-rounded once, each product and sum once: (4 + 4θ)T + 3(e₁x + e₂y)/m + 2.5 times u. x = (column − rest of X) + whole
+rounded once, each product and sum once: (4 + 5θ)T + 4(e₁x + e₂y)/m + 3 times u. x = (column − rest of X) + whole
 numbers is off by (4.5 + 1.1|x|)u, of which disc has 2.2√T + 0.5 times 1/w, and y likewise. Together, by m,
 
     error = u (14.2 T + 4 + (9.9 T + 14.4) / w)
 
-and a pixel with |disc| ≤ 4 · error · m is left to float64. For all others √disc is within √(error · m) / 4, and k,
-which is at least 0.4 zm, within (2.5ρ(√error/4 + 8u) + 24u)k: nearer to each other than the sum of both, two spheres
+and a pixel with |disc| ≤ 4 · error · m is left to float64. For all others √disc is within 0.27 √(error · m), and k,
+which is at least 0.7 zm, within (2.5ρ(√error/4 + 8u) + 24u)k: nearer to each other than the sum of both, two spheres
 are left to float64, too. s is below 2ac / ((1 − ρ²)(m − ρ²)), which for one m is largest where U = V.
 
 **What colour it has.** In pixels, with D = (u, v, −f), the hit is at n = δ + τD from the sphere's middle, where
-δ = (x, y, 0), τ = −(g + √(g² − a(w² − δ²))) / a, g = δ·D, a = D·D. Let s² be the largest a/f² of a pixel of the tile,
+δ = (x, y, 0), τ = −(g + √(g² + a(w² − δ²))) / a, g = δ·D, a = D·D. Let s² be the largest a/f² of a pixel of the tile,
 and t² = s² − 1; then |δ| ≤ 1.05sw. u and v are exact, X and Y rounded once, x and y too; so δ is off by √2ηw,
 η = u(0.71(|X| + |Y|)/w + 0.75s); f and w are rounded once. So g is off by √a·w(1.42η + 2.1tu), the root's argument by
 aw²·2c₁, and n by w·q, where cos is the root by its largest value and
 
     q = c₀ + c₁/cos,  c₁ = 1.5(s + t)η + (2.2t² + 3.85s² + 2)u,  c₀ = 2.84η + (7.4t + 6.5)u
 
-as long as cos² > 16c₁. (What float64 itself leaves of the error of its k, 2⁻²⁶ at most, is below 2⁻⁵²/(ρ² cos), and
+as long as cos² > 16c₁. (What float64 itself leaves of the error of its k, 2⁻²⁶ at most, is below 2⁻⁵³m/(ρ² cos), and
 added to c₁.) The point P is off by r·q and by 4u|P|, the light's place by u of itself; so the direction towards it by
 (r·q + 5u|light|) / |T| + 5u, as |P| ≤ |T| + |light|. n·T, the rough root of T·T and their product are off by 8u,
 colours by 2u, each light's sum by 1u. So a channel is off by 255 · (its diffuse colour) times
@@ -60,7 +60,7 @@ from raytracer.twofold import Number
 
 U = 2.0**-24
 ONE_BYTE = 65536.0  # bytes have so many parts here
-_CROOKED = 2.0**-40  # a frame whose vectors are no more than this off unit length and right angles is taken for right
+_CROOKED = 2.0**-44  # a frame whose vectors are no more than this off unit length and right angles is taken for right
 _LONGEST = 2.0**16  # focal length in pixels
 _BEYOND = 0.25  # how far beyond the picture's U and V a sphere's middle may be
 _STEEPEST = 8.0
@@ -89,12 +89,12 @@ def flatness_of(s: float) -> float:
     return float(max(2.84 / (1.5 * (s + t)), (7.4 * t + 6.5) / (2.2 * t2 + 3.85 * s * s + 2.0)))
 
 
-def coarseness_of(away: Number, blur: Number, s: float, focus: float) -> Number:
-    """c₁, for |X| + |Y|, 1 / w, s and f."""
+def coarseness_of(away: Number, blur: Number, s: float, focus: float, widest: float) -> Number:
+    """c₁, for |X| + |Y|, 1 / w, s, f and the largest m."""
     t2 = s * s - 1.0
     wide = _SPARE * U * 1.5 * (s + np.sqrt(t2))
     rest = 0.75 * s * wide + _SPARE * U * (2.2 * t2 + 3.85 * s * s + 2.0)
-    return (2.0**-52 * focus * focus * blur + 0.71 * wide * away) * blur + rest
+    return (2.0**-53 * widest * focus * focus * blur + 0.71 * wide * away) * blur + rest
 
 
 @lru_cache(maxsize=8)

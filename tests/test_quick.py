@@ -10,6 +10,7 @@ from raytracer.bench import spread
 from raytracer.quick import U, coarseness_of, error_of, flatness_of, make_quick, near_of
 from raytracer.render import draw
 from raytracer.scene import Camera, Light, Materials, Scene, Spheres
+from raytracer.screen import make_canvas, make_paints, open_screen
 
 pytestmark = pytest.mark.skipif(backend.why_no_compiler() != "", reason="numba is not installed")
 KERNELS = backend.load()
@@ -134,9 +135,45 @@ def test_the_discriminant_is_no_further_off_than_its_bound():
 def test_what_the_bounds_grow_with():
     few, many = np.float64(0.01), np.float64(10.0)
     assert U < error_of(2.0, few, few) < error_of(2.0, few, many) < error_of(4.0, few, many)
-    coarse = [coarseness_of(*numbers, 900.0) for numbers in ((few, few, 1.2), (few, many, 1.2), (many, many, 1.2))]
-    assert U < coarse[0] < coarse[1] < coarse[2] < coarseness_of(many, many, 1.6, 900.0)
+    coarse = [coarseness_of(*numbers, 900.0, 3.0) for numbers in ((few, few, 1.2), (few, many, 1.2), (many, many, 1.2))]
+    assert U < coarse[0] < coarse[1] < coarse[2] < coarseness_of(many, many, 1.6, 900.0, 3.0)
     assert 1.0 < flatness_of(1.6) < flatness_of(1.2) < 2.0
     assert near_of(few, U) < near_of(10 * few, U) < near_of(10 * few, 100 * U)
     for error in 2.0 ** np.arange(-24.0, -10.0):  # twice the sum that the text derives
         assert near_of(0.1, error) >= 2 * (2.5 * 0.1 * (np.sqrt(error) / 4 + 8 * U) + 24 * U)
+
+
+def full_tiles() -> Scene:
+    """Seven tiles in 128 x 224 pixels, a sphere a pixel: just missed, or just hit, so that float64 doubts all of them."""
+    rows, columns = np.mgrid[0:224, 0:128].reshape(2, -1)
+    tile, nth = rows // 32, (rows % 32) * 128 + columns
+    size = np.where(tile == 5, 0.0195, 0.69)
+    hit = np.where((tile == 6) | ((tile == 4) & (nth < 256)), -8e-6, 8e-6)
+    away = np.where(tile == 5, 0.0, size * (1 + hit) / np.sqrt(2))
+    lines = np.column_stack([columns - 64 + away, 112 - rows + np.where(rows % 32 >= 16, away, -away)])
+    kept = np.arange(len(tile)) > 0  # no list is longer than there is room for
+    fov, focus = np.degrees(2 * np.arctan(112 / 65000)), 65000.0
+    centres, materials = np.column_stack([lines / focus, -np.ones(len(lines))])[kept], Materials(np.full((1, 11), 0.7))
+    count = len(centres)
+    spheres = Spheres(
+        size[kept] / focus, centres, np.zeros(count, np.int32), np.arange(count, dtype=np.int32), materials
+    )
+    camera = Camera((0.0, 0.0, 0.0), fov=float(fov))
+    return Scene(camera, (0.0, 0.0, 0.0), (Light((1.0, 2.0, 3.0), (1.0, 1.0, 1.0)),), materials, spheres)
+
+
+def test_there_is_room_for_the_doubts_of_a_tile_and_of_all_that_was_put_off():
+    plan = make_plan(full_tiles(), "diffuse", 128, 224, path=KERNELS)
+    with open_screen(plan.scene, plan.raster, KERNELS, 1) as screen:
+        paints, picture, room = (
+            make_paints(plan, screen),
+            np.zeros((224, 128, 3), np.uint8),
+            np.full(40_000, -7, np.int64),
+        )
+        room[0], end = 0, len(screen.desks[0].doubts)
+        desk, tiles = screen.desks[0]._replace(doubts=room[:end]), screen.tiles_of(slice(0, 224))
+        done = KERNELS.paint_diffuse(screen.view, screen.slow, screen.bins, tiles, *desk, paints, make_canvas(picture))
+    assert paints.quick.usable
+    assert not done
+    assert 5 * 4000 < room[0] < end
+    assert (room[end:] == -7).all()

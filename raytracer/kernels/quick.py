@@ -6,7 +6,7 @@
                          number   which of the list that is                   │ …       │         │     │
                          doubt    where single precision cannot tell          └─────────────────────────┘
     doubt  ── _decide ─> number   in float64
-    number ── _shade ──> colours, in its place; those too close to another byte by _shade_anew, in float64
+    number ── _shade ──> colours, in its place; those too close to another byte by shade_anew, in float64
     colours ─ _put   ──> bytes of the picture
 
 The formulas and the bounds of their errors are those of `quick`.
@@ -60,7 +60,7 @@ from raytracer.quick import ONE_BYTE, coarseness_of, error_of, flatness_of, near
 from raytracer.shading import to_byte
 
 MOST = 1 << 12  # spheres of a tile's list; of more, the table would leave the core's caches
-_FEW_LATE = 256  # pixels to be shaded in float64: enough for a while
+FEW_LATE = 256  # pixels to be shaded in float64: enough for a while
 _BLOCKS = TILE_WIDTH // SIDE  # side by side
 _LINE = SIXTEEN * _BLOCKS  # pixels of a line of blocks
 _PIXELS, _MIDDLE, _MIDDLE_Y = np.uint64(TILE_WIDTH * TILE_HEIGHT), TILE_WIDTH // 2, TILE_HEIGHT // 2
@@ -88,7 +88,7 @@ def _paint_tile(view, slow, bins, tile, scratch, doubts, paints, out):
         return False
     if certain:
         _decide(view, bins, tile, sheet, doubts)
-    if sheet.late[0] > _FEW_LATE:
+    if sheet.late[0] > FEW_LATE:
         catch_up(view, paints, scratch, doubts, out)
     colour_all(view, bins, tile, coarsest, paints, sheet, out)
     return True
@@ -152,7 +152,7 @@ def _look(view, bins, at, row, tile, s, paints, sheet):
     store_halves(batch, _NEAR, near_of(rho, error))
     if shades:
         away, scale = abs(middle_x) + abs(middle_y), (255.0 * ONE_BYTE) * blur
-        coarse = coarseness_of(away, blur, s, quick.focus)
+        coarse = coarseness_of(away, blur, s, quick.focus, quick.widest)
         store_halves(batch, _COARSE, coarse)
         red, green, blue, _ = gather_rows(paints.colours, gather(view.material, where))
         store_table(
@@ -347,7 +347,8 @@ def _light(quick, sheet, p, q, x, y, u, v, longest, rim, flat):
     off = times_plus(rough * size, longest, flat) * coarse
     error = times_plus(nearness, np.float32(quick.far), np.float32(quick.rounding))
     error = times_plus(times_plus(nearness, unit * size, np.float32(quick.weight)), off, error)
-    none, error = ~((disc > size2 * rim) & (error <= _HOPELESS)), error * size
+    none = ~((disc > size2 * rim) & (error <= _HOPELESS))
+    error = lesser(error, _HOPELESS) * size  # what is not a number would be anything as a whole number
     errors = times_plus(error, r, _SPARE), times_plus(error, g, _SPARE), times_plus(error, b, _SPARE)
     return _parts(red, r), _parts(green, g), _parts(blue, b), errors, none
 

@@ -119,12 +119,6 @@ greater = intrinsic(_choice(">"))
 
 
 @intrinsic
-def lesser_number(typing, a, b):
-    """The smaller one in each lane, of numbers not below 0."""
-    return a(a, a), lambda context, builder, sig, args: builder.select(builder.icmp_unsigned("<", *args), *args)
-
-
-@intrinsic
 def sixteen(typing, number):
     """The same integer sixteen times."""
     return NUMBERS(types.int32), lambda context, builder, sig, args: _spread(builder, args[0], SIXTEEN)

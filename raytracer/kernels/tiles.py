@@ -27,6 +27,7 @@ from raytracer.kernels.lanes import (
     take_number,
 )
 from raytracer.kernels.quick import (
+    FEW_LATE,
     diffuse_quickly,
     diffuse_quickly_unchecked,
     flat_quickly,
@@ -39,7 +40,8 @@ from raytracer.kernels.visibility import STRIDE, list_doubts, see_tile, see_tile
 from raytracer.shading import to_byte
 from raytracer.twofold import select
 
-ROOM = 3 * TILE_WIDTH * TILE_HEIGHT  # for doubts: of a tile, and of pixels that have been put off
+# For doubts: those of a tile, then of pixels that have been put off until then, and at the end of those of that tile.
+ROOM = 3 * TILE_WIDTH * TILE_HEIGHT + FEW_LATE
 
 
 def _paint(view, slow, bins, tiles, scratch, doubts, paints, out):
