@@ -144,7 +144,7 @@ def test_what_the_bounds_grow_with():
 
 
 def full_tiles() -> Scene:
-    """Seven tiles in 128 x 224 pixels, a sphere a pixel: just missed, or just hit, so that float64 doubts all of them."""
+    """Seven tiles, a sphere a pixel: just missed, or just hit, so that float64 doubts all of them. 128 x 224 pixels."""
     rows, columns = np.mgrid[0:224, 0:128].reshape(2, -1)
     tile, nth = rows // 32, (rows % 32) * 128 + columns
     size = np.where(tile == 5, 0.0195, 0.69)
