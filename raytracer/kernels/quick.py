@@ -88,8 +88,6 @@ def _paint_tile(view, slow, bins, tile, scratch, doubts, paints, out):
         return False
     if certain:
         _decide(view, bins, tile, sheet, doubts)
-    if sheet.late[0] > FEW_LATE:
-        catch_up(view, paints, scratch, doubts, out)
     colour_all(view, bins, tile, coarsest, paints, sheet, out)
     return True
 
@@ -473,16 +471,14 @@ _colour_unchecked = variant(
     "_colour_unchecked",
     colour_line=_shade_unchecked,
 )
-flat_quickly = variant(
-    _paint_tile, "flat_quickly", draw_all=_draw_shapes, colour_all=_colour_flat, catch_up=nothing_left, certain=True
-)
+flat_quickly = variant(_paint_tile, "flat_quickly", draw_all=_draw_shapes, colour_all=_colour_flat, certain=True)
 diffuse_quickly = variant(
-    _paint_tile, "diffuse_quickly", draw_all=_draw_certain, colour_all=_colour_certain, catch_up=shade_anew,
+    _paint_tile, "diffuse_quickly", draw_all=_draw_certain, colour_all=_colour_certain,
     certain=True,
 )  # fmt: skip
 diffuse_quickly_unchecked = variant(
     _paint_tile, "diffuse_quickly_unchecked", draw_all=_draw_unchecked, colour_all=_colour_unchecked,
-    catch_up=nothing_left, certain=False,
+    certain=False,
 )  # fmt: skip
 
 

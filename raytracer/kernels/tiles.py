@@ -46,22 +46,24 @@ ROOM = 3 * TILE_WIDTH * TILE_HEIGHT + FEW_LATE
 
 def _paint(view, slow, bins, tiles, scratch, doubts, paints, out):
     """Paint tiles, as long as there are any and there is room for doubts; returns whether all are done, or taken."""
-    while len(doubts) - doubts[0] > ROOM:
-        number = _take(tiles)
-        if number < 0:
-            finish(view, paints, scratch, doubts, out)
-            return True
+    if len(doubts) - doubts[0] <= ROOM:
+        return False
+    number = _take(tiles)
+    while number >= 0:
         tile = _tile(view, bins, number)
         if len(slow.ids) == 0 and bins.starts[number] == bins.starts[number + 1]:
             fill_tile(scratch, tile, paints, out)
-            continue
-        if paint_quickly(view, slow, bins, tile, scratch, doubts, paints, out):
-            continue
-        if see(view, slow, bins, tile, scratch):
-            list_doubts(view, tile, scratch, doubts)
-        paint_tile(view, scratch, tile, paints, out)
-    finish(view, paints, scratch, doubts, out)
-    return False
+        elif not paint_quickly(view, slow, bins, tile, scratch, doubts, paints, out):
+            if see(view, slow, bins, tile, scratch):
+                list_doubts(view, tile, scratch, doubts)
+            paint_tile(view, scratch, tile, paints, out)
+        full = len(doubts) - doubts[0] <= ROOM
+        number = -1 if full else _take(tiles)
+        if number < 0 or scratch.quick.late[0] > FEW_LATE:
+            finish(view, paints, scratch, doubts, out)
+        if full:
+            return False
+    return True
 
 
 @borrowing
