@@ -148,5 +148,5 @@ def test_other_tiles_draw_the_same_bytes(wide, tmp_path):
         ).stdout.splitlines()
         for folder in (root, tmp_path)
     )  # fmt: skip
-    assert (here[0], there[0]) == ("64 64", f"{1 << wide} {1 << 9 - wide}")
+    assert (here[0], there[0]) == ("128 32", f"{1 << wide} {1 << 9 - wide}")
     assert here[1:] == there[1:]
