@@ -292,8 +292,8 @@ class QuickScratch(NamedTuple):
     batch: np.ndarray  # float32, flat: what is computed of eight spheres at once, for drawing
     blocks: np.ndarray  # int32, which blocks of a line show anything
     colour: np.ndarray  # int32, the colours of a line of blocks, red in the lowest byte
-    close: np.ndarray  # int32 (blocks + 1,), the first pixel of blocks that have pixels close to another byte
-    bits: np.ndarray  # int32 (blocks + 1,), a bit for each of those
+    close: np.ndarray  # int32 (blocks + 2,), the first pixel of blocks that have pixels close to another byte
+    bits: np.ndarray  # int32 (blocks + 2,), a bit for each of those
     late: np.ndarray  # int64 (1,), how many pixels are to be shaded in float64
     columns: np.ndarray  # int32: those
     rows: np.ndarray  # int32
@@ -324,7 +324,6 @@ class Paints(NamedTuple):
     """What a picture is painted with."""
 
     quick: Quick
-
     background: np.ndarray  # float64 (3,), from 0 to 255
     flat: np.ndarray  # float64 (3,), likewise: the one colour of a stage that has but one
     lights: np.ndarray  # float64 (n, 6): the place as seen from the eye, the colour

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from raytracer.arrays import Grid, Rays, TwofoldRays
-from raytracer.certified import in_range, inner
+from raytracer.certified import Three, in_range, inner
 from raytracer.image import check_fits_memory
 from raytracer.scene import Camera
 from raytracer.twofold import Number, Twofold, add, multiply, two_product
@@ -34,7 +34,6 @@ _BAND_TESTS = 1 << 22
 BAND_PIXELS = 1 << 15  # enough to outweigh what a task costs, few enough to stay in a core's cache
 
 Vectors = tuple[np.ndarray, np.ndarray, np.ndarray]
-Three = tuple[float, float, float]
 
 _PI = Decimal("3.14159265358979323846264338327950288419716939937510582097494459230781640628620899862803482534211706798")
 _DIGITS = 80

@@ -324,12 +324,13 @@ def _lights_from_eye(lights: tuple[Light, ...], camera: Camera, unit: int) -> np
 
 def make_full_paints(plan: Plan, screen: Screen) -> FullPaints:
     """What the stage `full` is painted with."""
-    scene, paints, shapes = plan.scene, make_paints(plan, screen), (plan.scene.spheres, plan.scene.triangles)
+    scene, shapes = plan.scene, (plan.scene.spheres, plan.scene.triangles)
     terms = terms_of(scene, bool(plan.lights))
     lights = tuple(light.position for light in plan.lights) if terms.shadows else ()
     glass = _glass(scene, screen) if terms.mirrors else NO_MIRRORS
     return FullPaints(
-        paints.background, scene.background, paints.lights, surfaces_of(scene.materials).reshape(-1),
+        _bytes_of(scene.background), scene.background, _lights_from_eye(plan.lights, scene.camera, screen.unit),
+        surfaces_of(scene.materials).reshape(-1),
         *light_cells(*shapes, screen.unit, reach_of(*shapes, screen.unit, screen.view.eye), lights, screen.kernels),
         tree_of(*shapes, screen.unit, screen.kernels), glass,
         terms.bits, terms.specular, terms.shadows, terms.mirrors,

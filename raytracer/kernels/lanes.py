@@ -157,14 +157,14 @@ for _symbol, _lower in (
     (operator.mul, ir.IRBuilder.fmul),
     (operator.truediv, ir.IRBuilder.fdiv),
 ):
-    for _kind in FLOATS:
-        _operator(_symbol, _kind, _kind, 2, _lower)
+    for _floats in FLOATS:
+        _operator(_symbol, _floats, _floats, 2, _lower)
 for _symbol, _lower in (
     (operator.neg, ir.IRBuilder.fneg),
     (abs, _instruction("llvm.fabs")),
 ):
-    for _kind in FLOATS:
-        _operator(_symbol, _kind, _kind, 1, _lower)
+    for _floats in FLOATS:
+        _operator(_symbol, _floats, _floats, 1, _lower)
 for _symbol, _lower in (
     (np.sqrt, _instruction("llvm.sqrt")),
     (np.floor, _instruction("llvm.floor")),
@@ -178,10 +178,10 @@ for _symbol, _sign in (
     (operator.ge, ">="),
     (operator.eq, "=="),
 ):
-    for _kind in FLOATS:
-        _operator(_symbol, _kind, _MASK_OF[_kind], 2, _comparison(_sign))
-    for _kind in INTEGERS:
-        _operator(_symbol, _kind, _MASK_OF[_kind], 2, _comparison_of_numbers(_sign))
+    for _floats in FLOATS:
+        _operator(_symbol, _floats, _MASK_OF[_floats], 2, _comparison(_sign))
+    for _integers in INTEGERS:
+        _operator(_symbol, _integers, _MASK_OF[_integers], 2, _comparison_of_numbers(_sign))
 _operator(operator.add, PLACES, PLACES, 2, ir.IRBuilder.add)
 _operator(operator.mul, PLACES, PLACES, 2, ir.IRBuilder.mul)
 for _symbol, _lower in (
@@ -191,8 +191,8 @@ for _symbol, _lower in (
     (operator.lshift, ir.IRBuilder.shl),
     (operator.rshift, ir.IRBuilder.lshr),
 ):
-    for _kind in INTEGERS:
-        _operator(_symbol, _kind, _kind, 2, _lower)
+    for _integers in INTEGERS:
+        _operator(_symbol, _integers, _integers, 2, _lower)
 for _mask in (MASK, MARKS, MARK_PAIRS):
     _operator(operator.and_, _mask, _mask, 2, ir.IRBuilder.and_)
     _operator(operator.or_, _mask, _mask, 2, ir.IRBuilder.or_)
@@ -613,17 +613,23 @@ def put_pixels(typing, picture, start, step, red, green, blue):
         bytes_ = [builder.fptoui(lanes, ir.VectorType(_INT32, WIDTH)) for lanes in colours]
         red, green, blue = (builder.trunc(lanes, ir.VectorType(_BYTE, WIDTH)) for lanes in bytes_)
         wide = _joined(builder, [red, green, blue, blue])
-        with builder.if_else(builder.icmp_unsigned("==", step, ir.Constant(step.type, 3))) as (three, four):
-            with three:
-                order = _order([WIDTH * colour + pixel for pixel in range(WIDTH) for colour in range(3)])
-                pixels = builder.shuffle_vector(wide, wide, order)
-                builder.store(pixels, _address(context, builder, sig.args[0], picture, start, pixels.type), align=1)
-            with four:
-                order = _order([WIDTH * colour + pixel for pixel in range(WIDTH) for colour in range(4)])
-                pixels = builder.shuffle_vector(wide, wide, order)
-                address = _address(context, builder, sig.args[0], picture, start, pixels.type)
-                keep = ir.Constant(ir.VectorType(_BIT, 4 * WIDTH), [True, True, True, False] * WIDTH)
-                builder.store(builder.select(keep, pixels, builder.load(address, align=1)), address, align=1)
+        three, four = (
+            [WIDTH * colour + pixel for pixel in range(WIDTH) for colour in range(step_bytes)] for step_bytes in (3, 4)
+        )
+        _put_bytes(context, builder, sig.args[0], picture, start, step, wide, three, four)
         return context.get_dummy_value()
 
     return types.void(picture, types.uint64, types.uint64, LANES, LANES, LANES), lower
+
+
+def _put_bytes(context, builder, kind, picture, start, step, wide, three, four):
+    """Pixels of three or four bytes into a flat picture: in which order, of a vector that has the bytes of all."""
+    with builder.if_else(builder.icmp_unsigned("==", step, ir.Constant(step.type, 3))) as (of_three, of_four):
+        with of_three:
+            pixels = builder.shuffle_vector(wide, wide, _order(three))
+            builder.store(pixels, _address(context, builder, kind, picture, start, pixels.type), align=1)
+        with of_four:
+            pixels = builder.shuffle_vector(wide, wide, _order(four))
+            address = _address(context, builder, kind, picture, start, pixels.type)
+            keep = ir.Constant(ir.VectorType(_BIT, len(four)), [True, True, True, False] * (len(four) // 4))
+            builder.store(builder.select(keep, pixels, builder.load(address, align=1)), address, align=1)

@@ -6,7 +6,7 @@
                          number   which of the list that is                   │ …       │         │     │
                          doubt    where single precision cannot tell          └─────────────────────────┘
     doubt  ── _decide ─> number   in float64
-    number ── _shade ──> colours, in its place; those too close to another byte by shade_anew, in float64
+    number ── _shade ──> colours of a line of blocks; those too close to another byte by shade_anew, in float64
     colours ─ _put   ──> bytes of the picture
 
 The formulas and the bounds of their errors are those of `quick`.
@@ -14,7 +14,7 @@ The formulas and the bounds of their errors are those of `quick`.
 
 import numpy as np
 
-from raytracer.certified import approach, edge_of, inner, side_of
+from raytracer.certified import approach, inner
 from raytracer.kernels.bounds import TILE_HEIGHT, TILE_WIDTH
 from raytracer.kernels.compiler import borrowing, inlined, variant
 from raytracer.kernels.lanes import (
@@ -55,7 +55,7 @@ from raytracer.kernels.sixteen import (
     whole_numbers,
 )
 from raytracer.kernels.surfaces import diffuse_at, meet_spheres
-from raytracer.kernels.visibility import AHEAD, corners_of, fetch, holds, sphere_of
+from raytracer.kernels.visibility import AHEAD, corners_of, fetch, from_eye, holds, sphere_of
 from raytracer.quick import ONE_BYTE, coarseness_of, error_of, flatness_of, near_of
 from raytracer.shading import to_byte
 
@@ -212,7 +212,7 @@ def _decide(view, bins, tile, sheet, doubts):
                 p = np.int32(block) * SIXTEEN + lowest_bit(bits)
                 bits &= bits - 1
                 x, y = _pixel(p)
-                if tile.left + x < tile.right and tile.top + y < tile.bottom:
+                if _is_in(tile, x, y):
                     number, unsure = _first_of(view, bins, tile, x, y)
                     sheet.number[p] = number
                     if unsure:
@@ -227,23 +227,26 @@ def _pixel(p):
     return block % _BLOCKS * SIDE + lane % SIDE, block // _BLOCKS * SIDE + lane // SIDE
 
 
+@inlined
+def _is_in(tile, x, y):
+    """Whether the picture has that pixel of the tile."""
+    return tile.left + x < tile.right and tile.top + y < tile.bottom
+
+
 @borrowing
 def _first_of(view, bins, tile, x, y):
     """Which of a tile's list one of its pixels sees, counted from 1; and whether float64 cannot tell."""
-    best, number, unsure = np.inf, 0, False
-    eye, u, v, back = view.eye, view.u, view.v, view.back
+    best, number, unsure, balls = np.inf, 0, False, view.balls
     across, up, row = view.across[tile.left + x], view.up[tile.top + y], tile.top + y
     a = (across * view.a2 + view.a1[row]) * across + view.a0[row]
     for place in range(bins.starts[tile.number], bins.middles[tile.number]):
         entry = bins.entries[place]
         if not holds(entry, x, y):
             continue
-        i, balls = np.uint64(4) * sphere_of(entry), view.balls
-        lx, ly, lz = eye[0] - balls[i], eye[1] - balls[i + _ONE], eye[2] - balls[i + np.uint64(2)]
-        c, square = side_of(lx, ly, lz, balls[i + np.uint64(3)])
-        hv, hw = inner(v[0], v[1], v[2], lx, ly, lz), -inner(back[0], back[1], back[2], lx, ly, lz)
-        h = across * inner(u[0], u[1], u[2], lx, ly, lz) + (up * hv + hw)
-        k, wins, doubt = approach(h, a, c, edge_of(c, square, view.reach, view.kappa), best)
+        i = np.uint64(4) * sphere_of(entry)
+        radius = balls[i + np.uint64(3)]
+        hu, hv, hw, c, edge = from_eye(view, balls[i], balls[i + _ONE], balls[i + np.uint64(2)], radius)
+        k, wins, doubt = approach(across * hu + (up * hv + hw), a, c, edge, best)
         unsure |= doubt
         if wins:
             best, number = k, place - bins.starts[tile.number] + 1
@@ -252,16 +255,16 @@ def _first_of(view, bins, tile, x, y):
 
 def _colour_all(view, bins, tile, coarsest, paints, sheet, out):
     """Colours and bytes, a line of blocks after the other; meanwhile the processor fetches where the next one goes."""
-    count = 0
+    limits, count = _limits(paints.quick, tile, coarsest), 0
     for line in range((tile.bottom - tile.top + SIDE - 1) // SIDE):
         _fetch_pixels(tile, line + 1, out)
-        count = colour_line(tile, line, coarsest, paints.quick, sheet, count)
+        count = colour_line(tile, line, limits, paints.quick, sheet, count)
         _put(tile, line, sheet, out)
     _keep_for_later(bins, tile, count, sheet)
 
 
 @inlined
-def _flat(tile, line, coarsest, quick, sheet, close):
+def _flat(tile, line, limits, quick, sheet, close):
     """One colour wherever anything is hit."""
     p, flat, background = np.uint64(_LINE * line), sixteen(quick.flat), sixteen(quick.background)
     for at in range(np.uint64(0), np.uint64(_LINE), _SIXTEEN):
@@ -269,7 +272,7 @@ def _flat(tile, line, coarsest, quick, sheet, close):
     return close
 
 
-def _shade(tile, line, coarsest, quick, sheet, close):
+def _shade(tile, line, limits, quick, sheet, close):
     """`stages.diffuse`. Returns how many blocks have been listed that have pixels close to another byte."""
     background, start, count = sixteen(quick.background), np.uint64(_LINE * line), 0
     for block in range(np.uint64(_BLOCKS)):
@@ -280,14 +283,12 @@ def _shade(tile, line, coarsest, quick, sheet, close):
     sheet.blocks[count] = sheet.blocks[max(count - 1, 0)]
     y = both(rows_of_block()) + np.float32(SIDE * line)
     v, y = np.float32(quick.middle_y - tile.top) - y, y - _MIDDLE_Y
-    left, longest = np.float32(tile.left - quick.middle_x), _longest(quick, tile)
-    flat, rim = np.float32(flatness_of(longest / quick.focus)), np.float32(16.0 * longest * longest * coarsest)
-    longest = np.float32(longest)
+    left = np.float32(tile.left - quick.middle_x)
     for k in range(np.uint64(0), np.uint64(count), np.uint64(2)):
         one, other = np.uint64(sheet.blocks[k]), np.uint64(sheet.blocks[k + _ONE])
         x = both(columns_of_block()) + two(np.float32(np.int64(one) * SIDE), np.float32(np.int64(other) * SIDE))
         p, q = start + one * _SIXTEEN, start + other * _SIXTEEN
-        red, green, blue, error, none = _light(quick, sheet, p, q, x - _MIDDLE, y, x + left, v, longest, rim, flat)
+        red, green, blue, error, none = _light(quick, sheet, p, q, x - _MIDDLE, y, x + left, v, limits)
         colour, hit = red >> 16 | (green >> 8 & 0xFF00) | (blue & 0xFF0000), load_two(sheet.number, p, q) > 0
         store_pair(sheet.colour, one * _SIXTEEN, other * _SIXTEEN, blend(hit, colour, quick.background))
         if certain:
@@ -315,7 +316,15 @@ def _longest(quick, tile):
 
 
 @inlined
-def _light(quick, sheet, p, q, x, y, u, v, longest, rim, flat):
+def _limits(quick, tile, coarsest):
+    """What a tile's bounds of errors in colours share: the longest ray, how dark a rim has none, and c₀ / c₁."""
+    longest = _longest(quick, tile)
+    rim, flat = 16.0 * longest * longest * coarsest, flatness_of(longest / quick.focus)
+    return np.float32(longest), np.float32(rim), np.float32(flat)
+
+
+@inlined
+def _light(quick, sheet, p, q, x, y, u, v, limits):
     """Three channels of two blocks of pixels, in parts of a byte, bounds of their errors, and where there are none.
 
     x and y count from the middle of the tile, u and v from the middle of the picture: the ray is (u, v, −focus).
@@ -329,7 +338,7 @@ def _light(quick, sheet, p, q, x, y, u, v, longest, rim, flat):
     tau = -(along + _root(disc, rough)) * over
     t, nu, nv, nw = times_plus(unit, tau, unit), times_plus(tau, u, du), times_plus(tau, v, dv), tau * focus
     pu, pv, pw = t * u, t * v, t * focus
-    light, nothing = quick.lights, both(spread(_ZERO))
+    (longest, rim, flat), light, nothing = limits, quick.lights, both(spread(_ZERO))
     red, green, blue, nearness = nothing, nothing, nothing, nothing
     for i in range(np.uint64(0), np.uint64(len(light)), _LIGHT):
         tu, tv, tw = light[i] - pu, light[i + _ONE] - pv, light[i + np.uint64(2)] + pw
@@ -375,7 +384,7 @@ def _keep_for_later(bins, tile, count, sheet):
             p = sheet.close[k] + lowest_bit(bits)
             bits &= bits - 1
             x, y = _pixel(p)
-            if tile.left + x < tile.right and tile.top + y < tile.bottom:
+            if _is_in(tile, x, y):
                 sheet.columns[late], sheet.rows[late] = tile.left + x, tile.top + y
                 sheet.spheres[late] = sphere_of(bins.entries[last + sheet.number[p]])
                 late += 1

@@ -23,12 +23,13 @@ from raytracer.kernels.lanes import (
     SIXTEEN,
     WIDTH,
     _address,
+    _instruction,
     _joined,
     _load,
     _load_halves,
     _order,
+    _put_bytes,
     _spread,
-    _suffix,
 )
 
 SIDE = 4
@@ -50,8 +51,7 @@ def times_plus(typing, a, b, c):
         a, b, c = args
         if not PROCESSOR.get("fma"):
             return builder.fadd(builder.fmul(a, b), c)
-        function = ir.FunctionType(c.type, [c.type] * 3)
-        return builder.call(get_or_insert_function(builder.module, function, "llvm.fma" + _suffix(c.type)), args)
+        return _instruction("llvm.fma")(builder, *args)
 
     return kind(kind, kind, kind), lower
 
@@ -84,10 +84,7 @@ def _over(builder, x):
 
 
 def _over_root(builder, x):
-    kind = ir.FunctionType(x.type, [x.type])
-    return _over(
-        builder, builder.call(get_or_insert_function(builder.module, kind, "llvm.sqrt" + _suffix(x.type)), [x])
-    )
+    return _over(builder, _instruction("llvm.sqrt")(builder, x))
 
 
 @intrinsic
@@ -300,15 +297,8 @@ def put_sixteen(typing, picture, start, step, colours, at):
             place = builder.add(at, ir.Constant(at.type, SIXTEEN * block))
             quads.append(builder.load(_address(context, builder, sig.args[3], colours, place, row), align=4))
         wide = builder.bitcast(_joined(builder, quads), ir.VectorType(_BYTE, 4 * SIXTEEN))
-        with builder.if_else(builder.icmp_unsigned("==", step, ir.Constant(step.type, 3))) as (three, four):
-            with three:
-                order = _order([4 * pixel + colour for pixel in range(SIXTEEN) for colour in range(3)])
-                pixels = builder.shuffle_vector(wide, wide, order)
-                builder.store(pixels, _address(context, builder, sig.args[0], picture, start, pixels.type), align=1)
-            with four:
-                address = _address(context, builder, sig.args[0], picture, start, wide.type)
-                keep = ir.Constant(ir.VectorType(_BIT, 4 * SIXTEEN), [True, True, True, False] * SIXTEEN)
-                builder.store(builder.select(keep, wide, builder.load(address, align=1)), address, align=1)
+        three = [4 * pixel + colour for pixel in range(SIXTEEN) for colour in range(3)]
+        _put_bytes(context, builder, sig.args[0], picture, start, step, wide, three, range(4 * SIXTEEN))
         return context.get_dummy_value()
 
     return types.void(picture, types.uint64, types.uint64, colours, types.uint64), lower

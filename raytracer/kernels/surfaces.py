@@ -7,9 +7,10 @@
 
 import numpy as np
 
-from raytracer.certified import approach, edge_of, inner, side_of
+from raytracer.certified import approach
 from raytracer.kernels.compiler import inlined, variant
 from raytracer.kernels.lanes import WIDTH, at_least, first_of, gather, gather_rows, load, same, spread, store
+from raytracer.kernels.visibility import from_eye
 from raytracer.shading import cosine, land, land_on_any, towards
 
 
@@ -90,14 +91,8 @@ def _surface_of_hits(view, d, t, _, where):
 
 def colours_of_hits(view, paints, t, index, columns, rows, scratch, out):
     """The colours of single hits, float64 (n, 3): t, index and pixels are arrays of whole eights."""
-    u, v, back = view.u, view.v, view.back
     for k in range(np.uint64(0), np.uint64(len(t)), np.uint64(WIDTH)):
-        across, up = gather(view.across, load(columns, k)), gather(view.up, load(rows, k))
-        d = (
-            across * u[0] + (up * v[0] - back[0]),
-            across * u[1] + (up * v[1] - back[1]),
-            across * u[2] + (up * v[2] - back[2]),
-        )
+        _, _, d = _rays_of(view, load(rows, k), load(columns, k))
         red, green, blue = colours(view, paints, d, load(t, k), load(columns, k), load(index, k), scratch)
         store(scratch.batch, 0, red)
         store(scratch.batch, WIDTH, green)
@@ -115,16 +110,24 @@ def diffuse_at(view, paints, d, t, columns, index, scratch):
 @inlined
 def meet_spheres(view, rows, columns, where):
     """Where the rays of pixels meet the spheres at these places: t, D, and where float64 cannot tell."""
-    across, up, eye = gather(view.across, columns), gather(view.up, rows), view.eye
+    across, up, d = _rays_of(view, rows, columns)
     a = (across * view.a2 + gather(view.a1, rows)) * across + gather(view.a0, rows)
-    (x, y, z, radius), u, v, back = gather_rows(view.balls, where), view.u, view.v, view.back
-    x, y, z = eye[0] - x, eye[1] - y, eye[2] - z
-    hv, hw = inner(v[0], v[1], v[2], x, y, z), -inner(back[0], back[1], back[2], x, y, z)
-    c, square = side_of(x, y, z, radius)
-    edge = edge_of(c, square, view.reach, view.kappa)
-    k, _, doubt = approach(across * inner(u[0], u[1], u[2], x, y, z) + (up * hv + hw), a, c, edge, np.inf)
-    dx, dy, dz = up * v[0] - back[0], up * v[1] - back[1], up * v[2] - back[2]
-    return k / a, (across * u[0] + dx, across * u[1] + dy, across * u[2] + dz), doubt
+    x, y, z, radius = gather_rows(view.balls, where)
+    hu, hv, hw, c, edge = from_eye(view, x, y, z, radius)
+    k, _, doubt = approach(across * hu + (up * hv + hw), a, c, edge, np.inf)
+    return k / a, d, doubt
+
+
+@inlined
+def _rays_of(view, rows, columns):
+    """U, V and D of the rays of pixels."""
+    across, up, u, v, back = gather(view.across, columns), gather(view.up, rows), view.u, view.v, view.back
+    d = (
+        across * u[0] + (up * v[0] - back[0]),
+        across * u[1] + (up * v[1] - back[1]),
+        across * u[2] + (up * v[2] - back[2]),
+    )
+    return across, up, d
 
 
 diffuse_of_spheres = variant(_diffuse, "diffuse_of_spheres", inlined, surface=_surface_of_spheres)

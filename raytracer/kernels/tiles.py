@@ -228,35 +228,21 @@ _diffuse_tile = variant(_shaded_tile, "_diffuse_tile", shade=diffuse_of_spheres)
 _diffuse_any_tile = variant(_shaded_tile, "_diffuse_any_tile", shade=diffuse_of_any)
 _normal_tile = variant(_shaded_tile, "_normal_tile", shade=normal)
 _full_tile = variant(_shaded_tile, "_full_tile", shade=_full)
-paint_flat = variant(
-    _paint, "paint_flat", paint_quickly=flat_quickly, paint_tile=_flat_tile, fill_tile=_fill_tile, see=see_tile,
-    finish=nothing_left,
-)  # fmt: skip
-paint_diffuse = variant(
-    _paint, "paint_diffuse", paint_quickly=diffuse_quickly, paint_tile=_diffuse_tile, fill_tile=_fill_tile,
-    see=see_tile, finish=shade_anew,
-)  # fmt: skip
-paint_diffuse_unchecked = variant(
-    _paint, "paint_diffuse_unchecked", paint_quickly=diffuse_quickly_unchecked, paint_tile=_diffuse_tile,
-    fill_tile=_fill_tile, see=see_tile_unchecked, finish=nothing_left,
-)  # fmt: skip
-paint_diffuse_any = variant(
-    _paint, "paint_diffuse_any", paint_quickly=diffuse_quickly, paint_tile=_diffuse_any_tile, fill_tile=_fill_tile,
-    see=see_tile, finish=shade_anew,
-)  # fmt: skip
-paint_full = variant(
-    _paint, "paint_full", paint_quickly=never_quickly, paint_tile=_full_tile, fill_tile=_fill_tile, see=see_tile,
-    finish=nothing_left,
-)  # fmt: skip
-paint_normal = variant(
-    _paint, "paint_normal", paint_quickly=never_quickly, paint_tile=_normal_tile, fill_tile=_fill_tile, see=see_tile,
-    finish=nothing_left,
-)  # fmt: skip
-find_hits = variant(
-    _paint, "find_hits", paint_quickly=never_quickly, paint_tile=_hits_tile, fill_tile=_no_hits_tile, see=see_tile,
-    finish=nothing_left,
-)  # fmt: skip
-find_fine_hits = variant(
-    _paint, "find_fine_hits", paint_quickly=never_quickly, paint_tile=_fine_hits_tile, fill_tile=_no_hits_tile,
-    see=see_tile, finish=nothing_left,
-)  # fmt: skip
+
+
+def _painter(name, paint_tile, fill_tile=_fill_tile, see=see_tile, paint_quickly=never_quickly, finish=nothing_left):
+    return variant(
+        _paint, name, paint_tile=paint_tile, fill_tile=fill_tile, see=see, paint_quickly=paint_quickly, finish=finish
+    )
+
+
+paint_flat = _painter("paint_flat", _flat_tile, paint_quickly=flat_quickly)
+paint_diffuse = _painter("paint_diffuse", _diffuse_tile, paint_quickly=diffuse_quickly, finish=shade_anew)
+paint_diffuse_unchecked = _painter(
+    "paint_diffuse_unchecked", _diffuse_tile, see=see_tile_unchecked, paint_quickly=diffuse_quickly_unchecked
+)
+paint_diffuse_any = _painter("paint_diffuse_any", _diffuse_any_tile, paint_quickly=diffuse_quickly, finish=shade_anew)
+paint_full = _painter("paint_full", _full_tile)
+paint_normal = _painter("paint_normal", _normal_tile)
+find_hits = _painter("find_hits", _hits_tile, fill_tile=_no_hits_tile)
+find_fine_hits = _painter("find_fine_hits", _fine_hits_tile, fill_tile=_no_hits_tile)

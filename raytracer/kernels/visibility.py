@@ -75,15 +75,23 @@ def _see(view, slow, bins, tile, scratch):
 @inlined
 def _look_at_eight(view, bins, first, scratch):
     """What the next eight spheres of a list have in common with all rows: h is across·hu + up·hv + hw; c and edge."""
-    u, v, back, batch = view.u, view.v, view.back, scratch.batch
-    x, y, z, radius = gather_rows(view.balls, load_low(bins.entries, first))
+    batch = scratch.batch
+    hu, hv, hw, c, edge = from_eye(view, *gather_rows(view.balls, load_low(bins.entries, first)))
+    store(batch, 0, hu)
+    store(batch, 8, hv)
+    store(batch, 16, hw)
+    store(batch, 24, c)
+    store(batch, 32, edge)
+
+
+@inlined
+def from_eye(view, x, y, z, radius):
+    """A sphere as eye rays see it: h is across·hu + (up·hv + hw); c and edge."""
+    u, v, back = view.u, view.v, view.back
     lx, ly, lz = view.eye[0] - x, view.eye[1] - y, view.eye[2] - z
     c, square = side_of(lx, ly, lz, radius)
-    store(batch, 0, inner(u[0], u[1], u[2], lx, ly, lz))
-    store(batch, 8, inner(v[0], v[1], v[2], lx, ly, lz))
-    store(batch, 16, -inner(back[0], back[1], back[2], lx, ly, lz))
-    store(batch, 24, c)
-    store(batch, 32, edge_of(c, square, view.reach, view.kappa))
+    hu, hv = inner(u[0], u[1], u[2], lx, ly, lz), inner(v[0], v[1], v[2], lx, ly, lz)
+    return hu, hv, -inner(back[0], back[1], back[2], lx, ly, lz), c, edge_of(c, square, view.reach, view.kappa)
 
 
 @inlined
