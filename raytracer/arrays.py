@@ -259,11 +259,11 @@ class Tile(NamedTuple):
 class Tiles(NamedTuple):
     """Tiles that some threads are to paint, each the next that nobody has taken.
 
-    Each thread has a run of its own, and when that is done, it helps with those of others: at one time they write to
+    Each thread has a run of its own, and when that is done, it helps with the ends of others: at one time they write to
     places far from each other, and at the next picture to the same ones again, which their core may still hold.
     """
 
-    next: np.ndarray  # int64 (runs · APART,), how many have been taken of each run, each in a cache line of its own
+    taken: np.ndarray  # int64 (runs · APART,): of each run, how many have been taken, from its front, and from its end
     first: int
     last: int  # excluded
     own: int  # the run of the thread that asks
@@ -290,13 +290,16 @@ class QuickScratch(NamedTuple):
     doubt: np.ndarray  # int32 (blocks,), a bit a pixel
     table: np.ndarray  # float32, flat: eight numbers for each of the tile's list, for shading; the first row is free
     batch: np.ndarray  # float32, flat: what is computed of eight spheres at once, for drawing
-    blocks: np.ndarray  # int32, which blocks of a line show anything
+    blocks: np.ndarray  # int32, which blocks of a line show anything: first those of one sphere, then others
+    firsts: np.ndarray  # int32, which sphere that is
+    mixed: np.ndarray  # int32, the others
+    columns: np.ndarray  # float32 (8 · 32,), the columns of the table for the pixels of two blocks
     colour: np.ndarray  # int32, the colours of a line of blocks, red in the lowest byte
     close: np.ndarray  # int32 (blocks + 2,), the first pixel of blocks that have pixels close to another byte
     bits: np.ndarray  # int32 (blocks + 2,), a bit for each of those
     late: np.ndarray  # int64 (1,), how many pixels are to be shaded in float64
-    columns: np.ndarray  # int32: those
-    rows: np.ndarray  # int32
+    late_columns: np.ndarray  # int32: those
+    late_rows: np.ndarray  # int32
     spheres: np.ndarray  # int32, what they show
 
 

@@ -70,7 +70,7 @@ _DOUBTS = 1 << 15  # pixels that a thread lists before they are decided
 _FEW = 1 << 15  # spheres below which one thread sorts them sooner than two
 _MOST_WORKERS = 8  # that sort: each counts all tiles anew
 _BAND_PIXELS = 1 << 18  # of a numpy stage's block
-_PIXELS_A_MOMENT, _SPHERES_A_MOMENT = 1 << 21, 1 << 15  # what is drawn in two milliseconds or so
+_PIXELS_A_MOMENT, _SPHERES_A_MOMENT = 1 << 22, 1 << 15  # what is drawn in two milliseconds or so
 _STACK = 8 * 24  # boxes that may wait, eight a level
 _KEPT = 1 << 26  # bytes of a workspace that is kept
 
@@ -413,12 +413,15 @@ def _quick_scratch(workspace: Workspace, kernels: ModuleType, worker: int) -> Qu
         table=array(8 * (kernels.MOST + 16), np.float32, "table"),
         batch=array(160, np.float32, "batch"),
         blocks=array(line, np.int32, "blocks"),
+        firsts=array(line, np.int32, "firsts"),
+        mixed=array(line, np.int32, "mixed"),
+        columns=array(8 * 32, np.float32, "columns"),
         colour=array(line, np.int32, "colour"),
         close=array(blocks + 2, np.int32, "close"),
         bits=array(blocks + 2, np.int32, "bits"),
         late=array(1, np.int64, "late"),
-        columns=array(late, np.int32, "columns"),
-        rows=array(late, np.int32, "rows"),
+        late_columns=array(late, np.int32, "late columns"),
+        late_rows=array(late, np.int32, "late rows"),
         spheres=array(late, np.int32, "spheres"),
     )
 

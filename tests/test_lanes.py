@@ -105,6 +105,19 @@ def test_boxes_and_pixels_are_written_in_rows():
     assert (four[36:] == 2).all()
 
 
+@pytest.mark.parametrize("step", [3, 4])
+def test_pixels_of_one_colour(step):
+    @borrowing
+    def run(picture, step):
+        k.put_alike(picture, np.uint64(step), np.uint64(step), np.int32(0x030201))
+
+    picture = np.full((k.ALIKE + 2, step), 7, np.uint8)
+    run(picture.reshape(-1), step)
+    expected = np.full((k.ALIKE + 2, step), 7, np.uint8)
+    expected[1:-1, :3] = 1, 2, 3
+    np.testing.assert_array_equal(picture, expected)
+
+
 def test_pairs_of_rows():
     numbers, places = np.arange(40.0), np.arange(40, dtype=np.int32)
 
@@ -234,14 +247,16 @@ def test_choices_marks_and_numbers():
 
 def test_a_table_of_eight_columns():
     @borrowing
-    def run(columns, numbers, table, out):
+    def run(columns, numbers, table, place, out, spread):
         c = columns
         s.store_table(
             table, np.uint64(1), k.load(c, 0), k.load(c, np.uint64(8)), k.load(c, np.uint64(16)),
             k.load(c, np.uint64(24)), k.load(c, np.uint64(32)), k.load(c, np.uint64(40)), k.load(c, np.uint64(48)),
             k.load(c, np.uint64(56)),
         )  # fmt: skip
-        found = s.gather_eight(table, numbers, np.uint64(0), np.uint64(16))
+        s.gather_to_columns(table, numbers, np.uint64(0), np.uint64(16), place)
+        found = s.load_columns(place)
+        s.spread_rows(table, numbers[0], numbers[1], spread)
         for i in range(8):
             k.store_pair(out, np.uint64(32 * i), np.uint64(32 * i + 16), found[i])
         s.store_halves(out, np.uint64(256), k.load(c, 0))
@@ -249,9 +264,11 @@ def test_a_table_of_eight_columns():
     rng = np.random.default_rng(1)
     columns, table = rng.normal(size=(8, 8)), np.zeros((9, 8), np.float32)
     numbers, out = rng.integers(0, 9, 32).astype(np.int32), np.empty(264, np.float32)
-    run(columns.reshape(-1), numbers, table.reshape(-1), out)
+    place, spread = np.empty(256, np.float32), np.empty(256, np.float32)
+    run(columns.reshape(-1), numbers, table.reshape(-1), place, out, spread)
     np.testing.assert_array_equal(table[1:], columns.T.astype(np.float32))
     np.testing.assert_array_equal(out[:256].reshape(8, 32), table[numbers].T)
+    np.testing.assert_array_equal(spread.reshape(8, 32), table[np.repeat(numbers[:2], 16)].T)
     np.testing.assert_array_equal(out[256:], columns[0].astype(np.float32))
 
 

@@ -20,6 +20,7 @@ from raytracer.kernels.compiler import borrowing, inlined, variant
 from raytracer.kernels.lanes import (
     SIXTEEN,
     WIDTH,
+    align_stack,
     any_of,
     bits_of,
     blend,
@@ -37,9 +38,10 @@ from raytracer.kernels.sixteen import (
     SIDE,
     both,
     columns_of_block,
-    gather_eight,
+    gather_to_columns,
     greater,
     lesser,
+    load_columns,
     load_numbers,
     load_two,
     lowest_bit,
@@ -48,6 +50,7 @@ from raytracer.kernels.sixteen import (
     rough_inverse_root,
     rows_of_block,
     sixteen,
+    spread_rows,
     store_halves,
     store_table,
     times_plus,
@@ -98,6 +101,7 @@ def _draw_all(view, bins, first, end, tile, paints, sheet):
         store(sheet.depth, p, spread(np.float32(np.inf)))
         store(sheet.number, p, sixteen(0))
     store(sheet.table, 0, spread(_ZERO))
+    align_stack()
     tie, coarsest, s, batch = _ZERO, _ZERO, _longest(paints.quick, tile) / paints.quick.focus, sheet.batch
     for at in range(first, end, WIDTH):
         count, row = min(WIDTH, end - at), np.uint64(at - first)
@@ -255,6 +259,7 @@ def _first_of(view, bins, tile, x, y):
 
 def _colour_all(view, bins, tile, coarsest, paints, sheet, out):
     """Colours and bytes, a line of blocks after the other; meanwhile the processor fetches where the next one goes."""
+    align_stack()
     limits, count = _limits(paints.quick, tile, coarsest), 0
     for line in range((tile.bottom - tile.top + SIDE - 1) // SIDE):
         _fetch_pixels(tile, line + 1, out)
@@ -274,21 +279,20 @@ def _flat(tile, line, limits, quick, sheet, close):
 
 def _shade(tile, line, limits, quick, sheet, close):
     """`stages.diffuse`. Returns how many blocks have been listed that have pixels close to another byte."""
-    background, start, count = sixteen(quick.background), np.uint64(_LINE * line), 0
-    for block in range(np.uint64(_BLOCKS)):
-        at = block * _SIXTEEN
-        store(sheet.colour, at, background)
-        sheet.blocks[count] = block
-        count += any_of(load_numbers(sheet.number, start + at) > 0)
-    sheet.blocks[count] = sheet.blocks[max(count - 1, 0)]
+    start = np.uint64(_LINE * line)
+    alike, mixed = _sort_blocks(start, sixteen(quick.background), sheet)
     y = both(rows_of_block()) + np.float32(SIDE * line)
     v, y = np.float32(quick.middle_y - tile.top) - y, y - _MIDDLE_Y
     left = np.float32(tile.left - quick.middle_x)
-    for k in range(np.uint64(0), np.uint64(count), np.uint64(2)):
+    for k in range(np.uint64(0), alike + mixed, np.uint64(2)):
         one, other = np.uint64(sheet.blocks[k]), np.uint64(sheet.blocks[k + _ONE])
-        x = both(columns_of_block()) + two(np.float32(np.int64(one) * SIDE), np.float32(np.int64(other) * SIDE))
         p, q = start + one * _SIXTEEN, start + other * _SIXTEEN
-        red, green, blue, error, none = _light(quick, sheet, p, q, x - _MIDDLE, y, x + left, v, limits)
+        if k < alike:
+            spread_rows(sheet.table, sheet.firsts[k], sheet.firsts[k + _ONE], sheet.columns)
+        else:
+            gather_to_columns(sheet.table, sheet.number, p, q, sheet.columns)
+        x = both(columns_of_block()) + two(np.float32(np.int64(one) * SIDE), np.float32(np.int64(other) * SIDE))
+        red, green, blue, error, none = _light(quick, sheet, x - _MIDDLE, y, x + left, v, limits)
         colour, hit = red >> 16 | (green >> 8 & 0xFF00) | (blue & 0xFF0000), load_two(sheet.number, p, q) > 0
         store_pair(sheet.colour, one * _SIXTEEN, other * _SIXTEEN, blend(hit, colour, quick.background))
         if certain:
@@ -298,6 +302,32 @@ def _shade(tile, line, limits, quick, sheet, close):
             close = _list(sheet, close, p, bits & 0xFFFF)
             close = _list(sheet, close, q, bits >> 16)
     return close
+
+
+@inlined
+def _sort_blocks(start, background, sheet):
+    """List the blocks of a line that show but one sphere, and which, then those that show several.
+
+    Returns how many they are, whole pairs both; what shows nothing becomes background.
+    """
+    alike, mixed = np.uint64(0), np.uint64(0)
+    for block in range(np.uint64(_BLOCKS)):
+        at = block * _SIXTEEN
+        store(sheet.colour, at, background)
+        numbers = load_numbers(sheet.number, start + at)
+        hit = bits_of(numbers > 0)
+        first = sheet.number[start + at + np.uint64(lowest_bit(np.int32(hit) | 0x10000) & 15)]
+        is_alike = bits_of(numbers == first) == hit  # never where nothing is hit
+        sheet.blocks[alike], sheet.firsts[alike], sheet.mixed[mixed] = block, first, block
+        alike += np.uint64(is_alike)
+        mixed += np.uint64((hit > 0) & (not is_alike))
+    sheet.blocks[alike] = sheet.blocks[max(alike, _ONE) - _ONE]
+    sheet.firsts[alike] = sheet.firsts[max(alike, _ONE) - _ONE]
+    sheet.mixed[mixed] = sheet.mixed[max(mixed, _ONE) - _ONE]
+    alike, mixed = alike + (alike & _ONE), mixed + (mixed & _ONE)
+    for k in range(mixed):
+        sheet.blocks[alike + k] = sheet.mixed[k]
+    return alike, mixed
 
 
 @inlined
@@ -324,12 +354,12 @@ def _limits(quick, tile, coarsest):
 
 
 @inlined
-def _light(quick, sheet, p, q, x, y, u, v, limits):
+def _light(quick, sheet, x, y, u, v, limits):
     """Three channels of two blocks of pixels, in parts of a byte, bounds of their errors, and where there are none.
 
     x and y count from the middle of the tile, u and v from the middle of the picture: the ray is (u, v, −focus).
     """
-    at_x, at_y, size, unit, r, g, b, coarse = gather_eight(sheet.table, sheet.number, p, q)
+    at_x, at_y, size, unit, r, g, b, coarse = load_columns(sheet.columns)
     focus, focus2, du, dv = np.float32(quick.focus), np.float32(quick.focus * quick.focus), x - at_x, at_y - y
     along, a, size2 = times_plus(du, u, dv * v), times_plus(u, u, times_plus(v, v, focus2)), size * size
     disc = times_plus(along, along, a * (size2 - times_plus(du, du, dv * dv)))
@@ -385,7 +415,7 @@ def _keep_for_later(bins, tile, count, sheet):
             bits &= bits - 1
             x, y = _pixel(p)
             if _is_in(tile, x, y):
-                sheet.columns[late], sheet.rows[late] = tile.left + x, tile.top + y
+                sheet.late_columns[late], sheet.late_rows[late] = tile.left + x, tile.top + y
                 sheet.spheres[late] = sphere_of(bins.entries[last + sheet.number[p]])
                 late += 1
     sheet.late[0] = late
@@ -401,27 +431,27 @@ def shade_anew(view, paints, scratch, doubts, out):
     sheet = scratch.quick
     count, sheet.late[0], width = sheet.late[0], 0, len(view.across) - WIDTH
     for spare in range(count, count + WIDTH):
-        sheet.columns[spare], sheet.rows[spare] = sheet.columns[0], sheet.rows[0]
+        sheet.late_columns[spare], sheet.late_rows[spare] = sheet.late_columns[0], sheet.late_rows[0]
         sheet.spheres[spare] = sheet.spheres[0]
     for k in range(np.uint64(0), np.uint64(count), np.uint64(WIDTH)):
-        where, rows, columns = load(sheet.spheres, k), load(sheet.rows, k), load(sheet.columns, k)
+        where, rows, columns = load(sheet.spheres, k), load(sheet.late_rows, k), load(sheet.late_columns, k)
         t, direction, doubt = meet_spheres(view, rows, columns, where)
         bits = np.int32(bits_of(doubt))
         while bits:
             pixel = k + np.uint64(lowest_bit(bits))
             bits &= bits - 1
             doubts[0] += 1
-            doubts[doubts[0]] = sheet.rows[pixel] * width + sheet.columns[pixel]
+            doubts[doubts[0]] = sheet.late_rows[pixel] * width + sheet.late_columns[pixel]
         red, green, blue = diffuse_at(view, paints, direction, t, columns, where, scratch)
         red, green, blue = whole(to_byte(red)), whole(to_byte(green)), whole(to_byte(blue))
         store(sheet.spheres, k, red + green * 256 + blue * 65536)
     for k in range(count):
-        start = (sheet.rows[k] - out.first_row) * out.row_bytes + sheet.columns[k] * out.pixel_bytes
-        _put_pixel(out, np.uint64(start), sheet.spheres[k])
+        start = (sheet.late_rows[k] - out.first_row) * out.row_bytes + sheet.late_columns[k] * out.pixel_bytes
+        put_pixel(out, np.uint64(start), sheet.spheres[k])
 
 
 @inlined
-def _put_pixel(out, start, colour):
+def put_pixel(out, start, colour):
     for channel in range(3):
         out.bytes[start + np.uint64(channel)] = colour >> 8 * channel & 255
 
@@ -448,7 +478,7 @@ def _put(tile, line, sheet, out):
             put_sixteen(out.bytes, start, step, sheet.colour, p)
             x, start, p = x + SIXTEEN, start + _SIXTEEN * step, p + np.uint64(SIXTEEN * SIDE)
         for pixel in range(np.uint64(tile.right - x)):
-            _put_pixel(
+            put_pixel(
                 out,
                 start + pixel * step,
                 sheet.colour[p + pixel // np.uint64(SIDE) * _SIXTEEN + pixel % np.uint64(SIDE)],

@@ -234,19 +234,56 @@ def both(typing, singles):
 
 
 @intrinsic
-def gather_eight(typing, table, numbers, i, j):
-    """The rows of a flat float32 table of eight columns, as eight pairs of singles.
+def gather_to_columns(typing, table, numbers, i, j, columns):
+    """The rows of a flat float32 table of eight columns, into `columns`: each of the eight for thirty-two pixels.
 
     Which rows the sixteen int32 say that begin with element i of an array, and those with element j.
     """
 
     def lower(context, builder, sig, args):
-        table, numbers, *places = args
-        parts = [_gather(context, builder, sig, table, numbers, place) for place in places]
-        columns = [_joined(builder, list(pair)) for pair in zip(*parts, strict=True)]
-        return context.make_tuple(builder, sig.return_type, columns)
+        table, numbers, *places, out = args
+        for start, place in zip((0, SIXTEEN), places, strict=True):
+            for i, column in enumerate(_gather(context, builder, sig, table, numbers, place)):
+                _store_column(context, builder, sig.args[4], out, 2 * SIXTEEN * i + start, column)
+        return context.get_dummy_value()
 
-    return types.UniTuple(SINGLE_PAIRS, _COLUMNS)(table, numbers, types.uint64, types.uint64), lower
+    return types.void(table, numbers, types.uint64, types.uint64, columns), lower
+
+
+@intrinsic
+def spread_rows(typing, table, a, b, columns):
+    """Two rows of such a table, likewise: row a for the first sixteen pixels, row b for the rest."""
+
+    def lower(context, builder, sig, args):
+        table, *rows, out = args
+        first = context.make_array(sig.args[0])(context, builder, table).data
+        for start, row in zip((0, SIXTEEN), rows, strict=True):
+            place = builder.mul(builder.sext(row, _INT64), ir.Constant(_INT64, _COLUMNS))
+            for i in range(_COLUMNS):
+                number = builder.load(builder.gep(first, [builder.add(place, ir.Constant(_INT64, i))]))
+                column = _spread(builder, number, SIXTEEN)
+                _store_column(context, builder, sig.args[3], out, 2 * SIXTEEN * i + start, column)
+        return context.get_dummy_value()
+
+    return types.void(table, types.int32, types.int32, columns), lower
+
+
+def _store_column(context, builder, kind, columns, start, column):
+    place = ir.Constant(_INT64, start)
+    builder.store(column, _address(context, builder, kind, columns, place, column.type), align=4)
+
+
+@intrinsic
+def load_columns(typing, columns):
+    """The eight that `gather_to_columns` or `spread_rows` has left."""
+
+    def lower(context, builder, sig, args):
+        starts = [ir.Constant(_INT64, 2 * SIXTEEN * i) for i in range(_COLUMNS)]
+        addresses = [_address(context, builder, sig.args[0], args[0], i, SINGLE_PAIRS.vector) for i in starts]
+        pairs = [builder.load(address, align=4) for address in addresses]
+        return context.make_tuple(builder, sig.return_type, pairs)
+
+    return types.UniTuple(SINGLE_PAIRS, _COLUMNS)(columns), lower
 
 
 def _gather(context, builder, sig, table, numbers, at):

@@ -15,12 +15,15 @@ from raytracer.kernels.bounds import TILE_HEIGHT, TILE_WIDTH
 from raytracer.kernels.compiler import borrowing, inlined, variant
 from raytracer.kernels.full import radiance
 from raytracer.kernels.lanes import (
+    ALIKE,
     WIDTH,
+    align_stack,
     any_of,
     at_least,
     is_hit,
     largest_of,
     load,
+    put_alike,
     put_pixels,
     spread,
     store,
@@ -33,6 +36,7 @@ from raytracer.kernels.quick import (
     flat_quickly,
     never_quickly,
     nothing_left,
+    put_pixel,
     shade_anew,
 )
 from raytracer.kernels.surfaces import ball_of, diffuse_of_any, diffuse_of_spheres, line_of, normal, ray_of
@@ -46,6 +50,7 @@ ROOM = 3 * TILE_WIDTH * TILE_HEIGHT + FEW_LATE
 
 def _paint(view, slow, bins, tiles, scratch, doubts, paints, out):
     """Paint tiles, as long as there are any and there is room for doubts; returns whether all are done, or taken."""
+    align_stack()
     if len(doubts) - doubts[0] <= ROOM:
         return False
     number = _take(tiles)
@@ -69,14 +74,16 @@ def _paint(view, slow, bins, tiles, scratch, doubts, paints, out):
 @borrowing
 def _take(tiles):
     """The number of a tile that nobody has taken, −1 if there is none."""
-    runs = len(tiles.next) // APART
+    runs = len(tiles.taken) // APART
     length = (tiles.last - tiles.first + runs - 1) // runs
     for turn in range(runs):
         run = (tiles.own + turn) % runs
-        start = tiles.first + run * length
-        number = start + take_number(tiles.next, np.uint64(run * APART))
-        if number < min(start + length, tiles.last):
-            return number
+        start, taken = tiles.first + run * length, np.uint64(run * APART)
+        end = min(start + length, tiles.last)
+        if start + take_number(tiles.taken, taken) < end:
+            if turn == 0:
+                return start + take_number(tiles.taken, taken + np.uint64(1))
+            return end - 1 - take_number(tiles.taken, taken + np.uint64(2))
     return -1
 
 
@@ -109,10 +116,16 @@ def _background(paints):
 @borrowing
 def _fill_tile(scratch, tile, paints, out):
     """The background."""
-    red, green, blue = _background(paints)
+    red, green, blue = np.int32(paints.background[0]), np.int32(paints.background[1]), np.int32(paints.background[2])
+    colour, step, right = red | green << 8 | blue << 16, np.uint64(out.pixel_bytes), min(tile.right, out.columns)
     for row in range(tile.top, tile.bottom):
-        for x in range(tile.left, tile.right, WIDTH):
-            put_lanes(out, row, x, tile.right, red, green, blue, scratch)
+        start, x = np.uint64((row - out.first_row) * out.row_bytes + tile.left * out.pixel_bytes), tile.left
+        while x + ALIKE <= right:
+            put_alike(out.bytes, start, step, np.int32(colour))
+            x, start = x + ALIKE, start + np.uint64(ALIKE) * step
+        for _ in range(x, tile.right):
+            put_pixel(out, start, colour)
+            start += step
 
 
 @borrowing
