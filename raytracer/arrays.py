@@ -232,14 +232,37 @@ class Slow(NamedTuple):
     seen: Seen
 
 
+class Glance(NamedTuple):
+    """What has to be known of a picture to find where small spheres are on it: see `glance`. All float32."""
+
+    usable: bool
+    u: tuple[np.float32, np.float32, np.float32]  # the camera's axes
+    v: tuple[np.float32, np.float32, np.float32]
+    w: tuple[np.float32, np.float32, np.float32]
+    focus: np.float32  # the focal length in pixels
+    middle_x: np.float32  # the column of the ray (0, 0, −1)
+    middle_y: np.float32  # and the row
+    pad: np.float32  # pixels that a place is off, by m²
+    slack: np.float32  # and on top of that
+    width: np.float32
+    height: np.float32
+
+
+class Records(NamedTuple):
+    """Which shapes reach into which tiles, as a thread has found them."""
+
+    tiles: np.ndarray  # int32 (n,): the tile
+    corners: np.ndarray  # int32: bottom | top | right | left of the shape's box within the tile, a byte each
+    shapes: np.ndarray  # int32
+
+
 class Bins(NamedTuple):
     """Which of the other spheres reach into which tile.
 
-    A list's entries ascend by sphere:    bottom | top | right | left   of its box within the tile, a byte each
+    An entry of a list:                   bottom | top | right | left   of its box within the tile, a byte each
                                           sphere                        in the lower half
     """
 
-    boxes: np.ndarray  # int32, flat: left, right, top, bottom of each sphere of the scene
     starts: np.ndarray  # int64 (tiles + 1,)
     entries: np.ndarray  # uint64: the list of tile i is entries[starts[i] : starts[i + 1]]; some more to spare
     middles: np.ndarray  # int64 (tiles,), where in its list the triangles begin

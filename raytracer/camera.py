@@ -29,6 +29,7 @@ from raytracer.twofold import Number, Twofold, add, multiply, two_product
 SAMPLINGS = {"corner": 0, "centre": 1}  # what is added to 2x and 2y
 
 _LARGEST_SIDE = (1 << 31) - 1  # that a PNG can name
+_CROOKED = 2.0**-44  # a frame whose vectors are no more than this off unit length and right angles is taken for right
 _SKEWED = 1e3  # a frame whose inverse magnifies rounding by more than this
 _BAND_TESTS = 1 << 22
 BAND_PIXELS = 1 << 15  # enough to outweigh what a task costs, few enough to stay in a core's cache
@@ -40,6 +41,12 @@ _DIGITS = 80
 
 
 @lru_cache(maxsize=64)
+def is_right(camera: Camera) -> bool:
+    """Whether u, v, w are of length 1, and at right angles."""
+    axes = camera.u, camera.v, camera.w
+    return all(abs(inner(*a, *b) - float(a is b)) <= _CROOKED for a in axes for b in axes)
+
+
 def focal_length(fov: float) -> float:
     """The float64 nearest to 1 / tan(fov / 2), fov in degrees, 0 < fov < 180; +inf where that is beyond float64."""
     with localcontext() as context:

@@ -73,13 +73,13 @@ def see_mirrors(
 ) -> Mirrors:  # fmt: skip
     """Where on a screen the mirror images of all shapes are: of spheres' `balls` and triangles' corners, in units.
 
-    shown are the boxes that the shapes themselves have there, int32 (shapes, 4). None where no mirror is seen, or a
+    shown are the boxes that the triangles themselves have there, int32 (n, 4). None where no mirror is seen, or a
     frame is so flat that boxes are not known.
     """
     shapes, (planes, numbers) = len(balls) + len(corners), mirror_planes(triangles, len(balls), unit)
     if not planes or lens.crosses == inf:
         return NO_MIRRORS
-    left, right, top, bottom = shown[numbers >= 0].T
+    left, right, top, bottom = shown[numbers[len(balls) :] >= 0].T
     if not ((left < right) & (top < bottom)).any():
         return NO_MIRRORS
     boxes = np.empty((len(planes), shapes, 4), np.int32)

@@ -52,15 +52,14 @@ from math import hypot
 import numpy as np
 
 from raytracer.arrays import Quick
-from raytracer.camera import SAMPLINGS, Raster, focal_length
+from raytracer.camera import SAMPLINGS, Raster, focal_length, is_right
 from raytracer.certified import inner
-from raytracer.scene import Camera, Colour, Light
+from raytracer.scene import Colour, Light
 from raytracer.stages import light_from_eye
 from raytracer.twofold import Number
 
 U = 2.0**-24
 ONE_BYTE = 65536.0  # bytes have so many parts here
-_CROOKED = 2.0**-44  # a frame whose vectors are no more than this off unit length and right angles is taken for right
 _LONGEST = 2.0**16  # focal length in pixels
 _BEYOND = 0.25  # how far beyond the picture's U and V a sphere's middle may be
 _STEEPEST = 8.0
@@ -118,7 +117,7 @@ def make_quick(
     widest = 1.0 + (across + _BEYOND) ** 2 + (up + _BEYOND) ** 2
     steep = 0.5 * (1.0 + widest) ** 2 / (_LEAST * (widest - 1.0 + _LEAST))
     usable = bool(
-        _is_right(camera) and steep < _STEEPEST and 1.0 < focus < _LONGEST
+        is_right(camera) and steep < _STEEPEST and 1.0 < focus < _LONGEST
         and farthest < _FARTHEST and weight < _BRIGHTEST and diffuse[0] >= 0.0 and diffuse[1] < _BRIGHTEST
     )  # fmt: skip
     return Quick(
@@ -127,12 +126,6 @@ def make_quick(
         np.array(rows if usable else [], np.float32).reshape(-1),
         weight, 5 * U * farthest, (16 + len(rows)) * U * weight, _packed(background), _packed(flat),
     )  # fmt: skip
-
-
-def _is_right(camera: Camera) -> bool:
-    """Whether u, v, w are of length 1, and at right angles."""
-    axes = camera.u, camera.v, camera.w
-    return all(abs(inner(*a, *b) - float(a is b)) <= _CROOKED for a in axes for b in axes)
 
 
 def _packed(colour: Colour) -> int:

@@ -13,7 +13,7 @@ float64 is not certain are listed, decided by `settle`, and painted anew.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import lru_cache
 from queue import Empty, Full, LifoQueue
@@ -33,6 +33,7 @@ from raytracer.arrays import (
     Canvas,
     FineRays,
     FullPaints,
+    Glance,
     Grid,
     HitRows,
     Hits,
@@ -40,6 +41,7 @@ from raytracer.arrays import (
     Paints,
     Quick,
     QuickScratch,
+    Records,
     Scratch,
     Seen,
     Sides,
@@ -53,6 +55,7 @@ from raytracer.camera import Raster, eye_grid, fine_columns, fine_rows
 from raytracer.eye import bundle_of, usable_spread
 from raytracer.facets import exact_volume
 from raytracer.full import surfaces_of, terms_of
+from raytracer.glance import make_glance
 from raytracer.lookup import light_cells, reach_of, tree_of
 from raytracer.mirrors import NO_MIRRORS, see_mirrors
 from raytracer.plan import Plan
@@ -65,6 +68,7 @@ from raytracer.stages import light_from_eye
 from raytracer.units import scene_units
 
 SPARE = 8  # elements at the end of arrays that are read eight at a time
+_SPARE_RECORDS = 1 << 10  # beyond those of spheres that reach into one or two tiles
 _SPARE = 32  # list entries beyond the last that a kernel may look at
 _DOUBTS = 1 << 15  # pixels that a thread lists before they are decided
 _FEW = 1 << 15  # spheres below which one thread sorts them sooner than two
@@ -86,10 +90,14 @@ class Workspace:
 
     def array(self, size: int, kind: type, name: str, worker: int = 0) -> np.ndarray:
         """An array of that size, with anything in it."""
+        return self.room(size, kind, name, worker)[:size]
+
+    def room(self, size: int, kind: type, name: str, worker: int = 0) -> np.ndarray:
+        """An array of that size or more."""
         kept = self._arrays.get((name, worker))
         if kept is None or len(kept) < size:
             kept = self._arrays[name, worker] = aligned(size, kind)
-        return kept[:size]
+        return kept
 
     def zeros(self, size: int, kind: type, name: str, worker: int = 0) -> np.ndarray:
         array = self.array(size, kind, name, worker)
@@ -134,6 +142,7 @@ class Screen(NamedTuple):
     view: View
     slow: Slow
     bins: Bins
+    facet_boxes: np.ndarray  # int32 (n, 4), where the triangles are
     targets: Targets
     workspace: Workspace
     desks: list[Desk]  # one a thread
@@ -289,12 +298,14 @@ def open_screen(scene: Scene, raster: Raster, kernels: ModuleType, threads: int 
         view, boxes = _view(raster, origin, balls, material), _NO_BOXES
         if len(corners):
             view, boxes = _with_facets(view, workspace, kernels, lens, raster, origin, corners, scene.triangles)
-        bins, slow_ids = _sort(workspace, kernels, lens, view, len(scene.spheres), boxes, threads)
+        glance = make_glance(raster, view.kappa)
+        bins, slow_ids = _sort(workspace, kernels, lens, glance, view, len(scene.spheres), boxes, threads)
         slow, targets = _slow(lens, view, origin, balls, slow_ids, kernels)
         targets = targets._replace(corners=corners, order=order)
         desks = [_desk(workspace, kernels, worker) for worker in range(threads or cores())]
         places = order if len(corners) and len(balls) else None
-        yield Screen(raster, unit, origin, len(scene.spheres), places, view, slow, bins, targets, workspace, desks)
+        size = len(scene.spheres)
+        yield Screen(raster, unit, origin, size, places, view, slow, bins, boxes, targets, workspace, desks)
 
 
 @lru_cache(maxsize=64)
@@ -338,8 +349,7 @@ def make_full_paints(plan: Plan, screen: Screen) -> FullPaints:
 
 
 def _glass(scene: Scene, screen: Screen) -> Mirrors:
-    balls, corners = screen.targets.balls, screen.targets.corners
-    shown = screen.bins.boxes.reshape(-1, 4)[: len(balls) + len(corners)]
+    balls, corners, shown = screen.targets.balls, screen.targets.corners, screen.facet_boxes
     return see_mirrors(
         make_lens(screen.raster), screen.view.eye, balls, corners, scene.triangles, screen.unit, shown, screen.kernels
     )
@@ -354,6 +364,8 @@ _NO_PAINTS = Paints(_NO_QUICK, np.zeros(3), np.zeros(3), np.empty((0, 6)), Mater
 
 _NO_SPHERES = np.empty(0)
 _NO_BOXES = np.empty((0, 4), np.int32)
+_NO_IDS = np.empty(0, np.int32)
+_NO_RECORDS = Records(_NO_IDS, _NO_IDS, _NO_IDS)
 _NONE_SLOW = Slow(np.empty(0, np.int32), _NO_BOXES, Seen(*[_NO_SPHERES] * len(Seen._fields)))
 
 
@@ -470,6 +482,7 @@ def _sort(
     workspace: Workspace,
     kernels: ModuleType,
     lens: Lens,
+    glance: Glance,
     view: View,
     spheres: int,
     facet_boxes: np.ndarray,
@@ -480,31 +493,42 @@ def _sort(
     rows = -(-(len(view.up) - 1) // kernels.TILE_HEIGHT)
     workers = 1 if spheres < _FEW else min(threads or cores(), _MOST_WORKERS)
     cuts = [spheres * worker // workers // 8 * 8 for worker in range(workers)] + [spheres]
-    first, shapes = view.first_facet, view.first_facet + len(facet_boxes)
-    boxes = workspace.array(4 * shapes, np.int32, "boxes")
-    boxes[4 * first :] = facet_boxes.reshape(-1)
     counts = workspace.zeros((workers + 1) * columns * rows, np.int64, "counts").reshape(workers + 1, -1)
     starts = workspace.array(columns * rows + 1, np.int64, "starts")
-    slow = 0
+    records: list[Records] = [_NO_RECORDS] * (workers + 1)
+    ends, slow = [0] * (workers + 1), [_NO_IDS] * workers
 
-    def bound(part: int, worker: int) -> int:
-        return int(
-            kernels.bound(
-                lens, view.eye, view.reach, view.kappa, view.balls, cuts[part], cuts[part + 1], boxes, counts[part],
-                columns,
+    def count(part: int, find: Callable[[Records], int], guess: int) -> None:
+        """Find a part's records, anew if there was no room for all of them."""
+        room = _records(workspace, part, guess)
+        end = find(room)
+        if end > len(room.tiles):
+            room = _records(workspace, part, end)
+            find(room)
+        records[part], ends[part] = room, end
+        kernels.count(room, end, counts[part])
+
+    def bound(part: int, worker: int) -> None:
+        first, last = cuts[part], cuts[part + 1]
+        ids = workspace.array(last - first, np.int32, "slow", part)
+        boxes = workspace.array(64, np.int32, "boxes", part)
+
+        def find(room: Records) -> int:
+            end, slows = kernels.bound(
+                glance, lens, view.eye, view.reach, view.kappa, view.balls, first, last, columns, room, ids, boxes
             )
-        )  # fmt: skip
+            slow[part] = ids[:slows].copy()
+            return int(end)
 
-    def add(found: int) -> None:
-        nonlocal slow
-        slow += found
+        count(part, find, (last - first) * 9 // 8 + _SPARE_RECORDS)
 
     def fill(part: int, worker: int) -> None:
-        kernels.fill(boxes, cuts[part], cuts[part + 1], counts[part], entries, columns)
+        kernels.fill(records[part], ends[part], counts[part], entries)
 
-    share(list(range(workers)), bound, threads, add)
+    share(list(range(workers)), bound, threads)
     if len(facet_boxes):
-        kernels.count(boxes, first, shapes, counts[workers], columns)
+        boxes, first = facet_boxes.reshape(-1), view.first_facet
+        count(workers, lambda room: int(kernels.record_boxes(boxes, first, columns, room)), 2 * len(facet_boxes))
     kernels.begin(counts, starts)
     middles = workspace.array(columns * rows, np.int64, "middles")
     middles[:] = counts[workers]
@@ -512,9 +536,12 @@ def _sort(
     entries[int(starts[-1]) :] = 0
     share(list(range(workers)), fill, threads)
     if len(facet_boxes):
-        kernels.fill(boxes, first, shapes, counts[workers], entries, columns)
-    which = np.flatnonzero(boxes[: 4 * spheres : 4] < 0) if slow else np.empty(0, np.int64)
-    return Bins(boxes, starts, entries, middles, columns), which.astype(np.int32)
+        fill(workers, 0)
+    return Bins(starts, entries, middles, columns), np.concatenate(slow)
+
+
+def _records(workspace: Workspace, part: int, size: int) -> Records:
+    return Records(*(workspace.room(size, np.int32, f"records' {name}", part) for name in Records._fields))
 
 
 def _slow(

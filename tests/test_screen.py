@@ -1,6 +1,7 @@
 """Eye rays in tiles: the same hits and the same bytes as the numpy path, whatever the size, the threads, the memory."""
 
 from dataclasses import replace
+from queue import LifoQueue
 
 import numpy as np
 import pytest
@@ -8,12 +9,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from raytracer import STAGES, backend, eye_hits, interpreter, make_plan, plain, render_scene, screen
+from raytracer.arrays import Records
 from raytracer.bench import spread
+from raytracer.boxes import make_lens
 from raytracer.camera import make_raster
 from raytracer.eye import count_tests
+from raytracer.glance import make_glance
 from raytracer.interpreter import interpret
+from raytracer.orbit import turned
 from raytracer.render import draw, hits_of, open_tracer
-from raytracer.scene import Camera, Scene, Spheres
+from raytracer.scene import Camera, Materials, Scene, Spheres
 from raytracer.screen import open_screen
 
 pytestmark = pytest.mark.skipif(backend.why_no_compiler() != "", reason="numba is not installed")
@@ -106,13 +111,60 @@ def test_rows_of_out_may_lie_apart():
     assert (room[:, 36:] == 9).all()
 
 
-def test_memory_is_forty_bytes_a_sphere_at_most():
+def records_of(scene, raster, usable):
+    """For each sphere, the pixels of the boxes that are recorded of it; and which spheres are slow."""
+    with open_screen(scene, raster, KERNELS) as opened:
+        view, columns = opened.view, opened.bins.columns
+        glance = make_glance(raster, view.kappa)
+        assert glance.usable
+        room = Records(*(np.empty(100 * len(scene) + 16, np.int32) for _ in range(3)))
+        slow, boxes = np.empty(len(scene), np.int32), np.empty(64, np.int32)
+        end, slows = KERNELS.bound(
+            glance._replace(usable=usable), make_lens(raster), view.eye, view.reach, view.kappa, view.balls, 0,
+            len(scene), columns, room, slow, boxes,
+        )  # fmt: skip
+        short = room._replace(tiles=room.tiles[:7])
+        assert KERNELS.bound(
+            glance._replace(usable=usable), make_lens(raster), view.eye, view.reach, view.kappa, view.balls, 0,
+            len(scene), columns, short, slow, boxes,
+        ) == (end, slows)  # fmt: skip
+    pixels = {}
+    for tile, corners, shape in zip(*(array[:end].tolist() for array in room), strict=True):
+        x, y = tile % columns * KERNELS.TILE_WIDTH, tile // columns * KERNELS.TILE_HEIGHT
+        left, right, top, bottom = (corners >> 8 * i & 255 for i in range(4))
+        assert left < right <= KERNELS.TILE_WIDTH
+        assert top < bottom <= KERNELS.TILE_HEIGHT
+        box = {(column, row) for column in range(x + left, x + right) for row in range(y + top, y + bottom)}
+        assert not box & pixels.get(shape, set())
+        pixels.setdefault(shape, set()).update(box)
+    return pixels, set(slow[:slows].tolist())
+
+
+@pytest.mark.parametrize(
+    "camera", [Camera(), turned(Camera(eye=(1.0, 2.0, 3.0), fov=100.0), (0.0, 0.0, -5.0), 0.3, -0.2)], ids=str
+)
+def test_boxes_at_a_glance_hold_those_of_float64_and_little_more(camera):
+    rng, count = np.random.default_rng(4), 3000
+    centres = np.array(camera.eye) + rng.normal(size=(count, 3)) * 10.0 ** rng.uniform(-1, 2, (count, 1))
+    radii = 10.0 ** rng.uniform(-3.5, 0.5, count)
+    spheres = Spheres(radii, centres, np.zeros(count, np.int32), np.arange(count, dtype=np.int32))
+    raster = make_raster(camera, 300, 170, rows=slice(32, 150))
+    scene = Scene(camera, materials=Materials(np.full((1, 11), 0.5)), spheres=spheres)
+    (found, slow), (expected, slow_too) = (records_of(scene, raster, usable) for usable in (True, False))
+    assert slow == slow_too
+    assert len(expected) > 100
+    assert all(box <= found.get(shape, set()) for shape, box in expected.items())
+    extra = sum(map(len, found.values())) - sum(map(len, expected.values()))
+    assert 0 <= extra < 0.01 * sum(map(len, expected.values()))
+
+
+def test_memory_is_forty_bytes_a_sphere_at_most(monkeypatch):
     scene, few = spread(400_000, seed=1), spread(10, seed=1)
     sizes = []
     for each in (few, scene):
+        monkeypatch.setattr(screen, "_idle", LifoQueue(1))
         with open_screen(each, make_raster(each.camera, 64, 64), KERNELS) as opened:
-            arrays = [opened.bins.boxes, opened.bins.entries, opened.slow.boxes]
-            sizes.append(sum(array.nbytes for array in arrays))
+            sizes.append(opened.workspace.nbytes)
     assert (sizes[1] - sizes[0]) / (len(scene.spheres) - len(few.spheres)) <= 40
 
 

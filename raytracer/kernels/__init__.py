@@ -3,7 +3,7 @@
 from raytracer.kernels.compiler import cache_named_after_sources
 
 with cache_named_after_sources():
-    from raytracer.kernels.bounds import TILE_HEIGHT, TILE_WIDTH, begin, bound, count, fill
+    from raytracer.kernels.bounds import TILE_HEIGHT, TILE_WIDTH, begin, bound, count, fill, record_boxes
     from raytracer.kernels.bvh import along_curve, build, candidates_in_tree, enclose, nearest_in_tree
     from raytracer.kernels.cells import bound_images, sort_into_cells
     from raytracer.kernels.facets import see_facets
@@ -63,6 +63,7 @@ __all__ = [
     "radiance_of",
     "range_of",
     "read_plain",
+    "record_boxes",
     "refine_given",
     "see_facets",
     "sort_into_cells",

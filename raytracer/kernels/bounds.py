@@ -1,13 +1,14 @@
-"""Which pixels can see which sphere: eight spheres at a time.
+"""Which pixels can see which sphere: sixteen spheres at a time.
 
     balls   x y z r | x y z r | …      float64, the scene's own, flat
-      ↓ box_of
-    boxes   left right top bottom | …  int32, flat; empty for what cannot be seen, left = −1 for a slow sphere
-    counts  how many boxes reach into each tile, int64
-      ↓ begin, fill
+      ↓ bound
+    records   tile | corners | shape    int32 each, one for each tile that a sphere's box reaches into
+      ↓ count, begin, fill
     entries   the list of each tile, see `Bins`
 
-A slow sphere is one that `certified.approach` is not for: around the eye or close to it, or reaching behind it.
+Single precision does it (the formulas and their errors are those of `glance`), and float64 those sixteen among which
+one is not for that. A slow sphere is one that `certified.approach` is not for either: around the eye or close to it, or
+reaching behind it.
 """
 
 import numpy as np
@@ -15,66 +16,172 @@ import numpy as np
 from raytracer.boxes import beside, box_of
 from raytracer.certified import edge_of, side_of
 from raytracer.kernels.compiler import borrowing, inlined
-from raytracer.kernels.lanes import WIDTH, all_of, load_rows, store_boxes
+from raytracer.kernels.lanes import SIXTEEN, WIDTH, all_of, bits_of, fetch_to_write, load_rows, store, store_boxes
+from raytracer.kernels.sixteen import (
+    ascending,
+    count_ones,
+    greater,
+    lesser,
+    lowest_bit,
+    rough_inverse,
+    rough_inverse_root,
+    singles,
+    store_some,
+    times_plus,
+    whole_numbers,
+)
 from raytracer.twofold import select
 
 _WIDE, _HIGH = 7, 5
 TILE_WIDTH, TILE_HEIGHT = 1 << _WIDE, 1 << _HIGH  # pixels: a tile's depth buffer fits a core's first cache
 _SLOW = -1.0
+_ALL = (1 << SIXTEEN) - 1
+_NEAREST, _FARTHEST = np.float32(1e-10), np.float32(1e10)  # lengths whose squares single precision holds
+_WIDEST = np.float32(2.0**20)  # m²
+_ROUGH = np.float32(1.0 + 2.0**-12)
+_ZERO, _UNIT, _FOUR = np.float32(0.0), np.float32(1.0), np.float32(4.0)
 
 
 @borrowing
-def bound(lens, eye, reach, kappa, balls, first, last, boxes, counts, columns):
-    """Boxes of spheres first to last − 1, first being a multiple of 8; returns how many of them are slow.
+def bound(near, lens, eye, reach, kappa, balls, first, last, columns, records, slow, boxes):
+    """Records of spheres first to last − 1, first being a multiple of 8, and in `slow` which of them are slow.
 
-    balls and boxes have room for whole eights. columns is how many tiles lie side by side.
+    Returns how many records there are, or would be if there was room, and how many slow ones. balls has room for whole
+    eights, slow for all of those spheres, boxes for 64 numbers; columns is how many tiles lie side by side.
     """
-    slow = 0
-    for i in range(np.uint64(first), np.uint64(last), np.uint64(WIDTH)):
-        x, y, z, radius = load_rows(balls, i)
-        qx, qy, qz = x - eye[0], y - eye[1], z - eye[2]
-        box = box_of(lens, qx, qy, qz, radius)
-        c, square = side_of(qx, qy, qz, radius)
-        quick = box.known & (box.ahead > 0.0) & (edge_of(c, square, reach, kappa) > 0.0)
-        hidden = box.known & (box.ahead <= 0.0)
-        if not all_of(box.known):
-            hidden = hidden | beside(lens, qx, qy, qz, c, square, radius)
-        left = select(quick, box.left, select(hidden, 0.0, _SLOW))
-        store_boxes(boxes, i, left, select(quick, box.right, 0.0), box.top, box.bottom)
-        slow += _count(boxes, i, min(i + np.uint64(WIDTH), np.uint64(last)), counts, columns)
-    return slow
+    end, slows, i = 0, 0, np.uint64(first)
+    while i < last:
+        odd = np.int32(_ALL)
+        if near.usable and i + np.uint64(SIXTEEN) <= last:
+            odd, end = _bound_sixteen(near, eye, balls, i, columns, records, end, boxes)
+        if odd:
+            stop = min(i + np.uint64(SIXTEEN), np.uint64(last))
+            for eight in range(i, stop, np.uint64(WIDTH)):
+                _bound_eight(lens, eye, reach, kappa, balls, eight, boxes)
+                for k in range(eight, min(eight + np.uint64(WIDTH), stop)):
+                    at = np.uint64(4) * (k - eight)
+                    if boxes[at] < 0:
+                        slow[slows] = k
+                        slows += 1
+                    else:
+                        end = _record(boxes, at, np.uint64(1), np.int32(k), columns, records, end)
+        i += np.uint64(SIXTEEN)
+    return end, slows
+
+
+@inlined
+def _bound_sixteen(near, eye, balls, i, columns, records, end, boxes):
+    """Record sixteen spheres, unless one is not for single precision; returns whether that is so, and the new end."""
+    x, y, z, r = load_rows(balls, i)
+    x2, y2, z2, r2 = load_rows(balls, i + np.uint64(WIDTH))
+    x, y, z = singles(x - eye[0], x2 - eye[0]), singles(y - eye[1], y2 - eye[1]), singles(z - eye[2], z2 - eye[2])
+    left, right, top, bottom, ahead, fit = _glance(near, x, y, z, singles(r, r2))
+    odd = np.int32(bits_of(~fit))
+    if odd:
+        return odd, end
+    shown = ahead & (left < right) & (top < bottom)
+    left, right, top, bottom = whole_numbers(left), whole_numbers(right), whole_numbers(top), whole_numbers(bottom)
+    column, row = left >> _WIDE, top >> _HIGH
+    within = shown & (right - 1 >> _WIDE == column) & (bottom - 1 >> _HIGH == row)
+    bits = np.int32(bits_of(within))
+    if end + SIXTEEN <= len(records.tiles):
+        x, y, at = column << _WIDE, row << _HIGH, np.uint64(end)
+        store_some(records.tiles, at, row * columns + column, within)
+        store_some(records.corners, at, left - x | right - x << 8 | top - y << 16 | bottom - y << 24, within)
+        store_some(records.shapes, at, ascending() + np.int32(i), within)
+    end += count_ones(bits)
+    across = np.int32(bits_of(shown)) & ~bits
+    if across:
+        store(boxes, 0, left)
+        store(boxes, SIXTEEN, right)
+        store(boxes, 2 * SIXTEEN, top)
+        store(boxes, 3 * SIXTEEN, bottom)
+    while across:
+        lane = np.uint64(lowest_bit(across))
+        across &= across - 1
+        end = _record(boxes, lane, np.uint64(SIXTEEN), np.int32(i + lane), columns, records, end)
+    return np.int32(0), end
+
+
+@inlined
+def _glance(near, x, y, z, radius):
+    """Left, right, top, bottom of the boxes of sixteen spheres; which are ahead; which this is for."""
+    u, v, w, four = near.u, near.v, near.w, radius * _FOUR
+    across, up = _along(u, x, y, z), _along(v, x, y, z)
+    depth = -_along(w, x, y, z)
+    away, over = abs(depth), rough_inverse(depth)
+    over = times_plus(times_plus(-depth, over, _UNIT), over, over)
+    across, up, rho = across * over, up * over, radius * over
+    across2, up2, rho2 = across * across, up * up, rho * rho
+    m, rest = across2 + up2 + _UNIT, _UNIT - rho2
+    fit = (four < away) & (away > _NEAREST) & (away < _FARTHEST) & (m < _WIDEST)
+    wider = times_plus(rho2, rough_inverse(rest), _UNIT) * near.focus
+    half, pad = rho * wider * _ROUGH, times_plus(m, near.pad, near.slack)
+    left, right = _pixels(across * wider + near.middle_x, half, across2 + rest, pad, near.width)
+    top, bottom = _pixels(near.middle_y - up * wider, half, up2 + rest, pad, near.height)
+    return left, right, top, bottom, depth > _ZERO, fit
+
+
+@inlined
+def _along(axis, x, y, z):
+    return times_plus(x, axis[0], times_plus(y, axis[1], z * axis[2]))
+
+
+@inlined
+def _pixels(middle, half, square, pad, size):
+    """The first pixel, and the one after the last, that may see an ellipse half · √square wide to both sides."""
+    reach = times_plus(half, square * rough_inverse_root(square), pad)
+    first, end = np.ceil(middle - reach), np.floor(middle + reach) + _UNIT
+    return lesser(greater(first, _ZERO), size), lesser(greater(end, _ZERO), size)
+
+
+@inlined
+def _bound_eight(lens, eye, reach, kappa, balls, i, boxes):
+    """Boxes of eight spheres: left, right, top, bottom of each; empty for what cannot be seen, left = −1 if slow."""
+    x, y, z, radius = load_rows(balls, i)
+    qx, qy, qz = x - eye[0], y - eye[1], z - eye[2]
+    box = box_of(lens, qx, qy, qz, radius)
+    c, square = side_of(qx, qy, qz, radius)
+    quick = box.known & (box.ahead > 0.0) & (edge_of(c, square, reach, kappa) > 0.0)
+    hidden = box.known & (box.ahead <= 0.0)
+    if not all_of(box.known):
+        hidden = hidden | beside(lens, qx, qy, qz, c, square, radius)
+    left = select(quick, box.left, select(hidden, 0.0, _SLOW))
+    store_boxes(boxes, np.uint64(0), left, select(quick, box.right, 0.0), box.top, box.bottom)
 
 
 @borrowing
-def count(boxes, first, last, counts, columns):
-    """Count the tiles of the boxes first to last − 1."""
-    _count(boxes, np.uint64(first), np.uint64(last), counts, columns)
+def _record(boxes, at, step, shape, columns, records, end):
+    """Record a shape, whose box is boxes[at], boxes[at + step], …, in each of its tiles; returns the new end."""
+    left, right, top, bottom = boxes[at], boxes[at + step], boxes[at + step + step], boxes[at + step + step + step]
+    if left < right and top < bottom:
+        for row in range(top >> _HIGH, (bottom - 1 >> _HIGH) + 1):
+            y = row << _HIGH
+            high, low = max(top - y, 0), min(bottom - y, TILE_HEIGHT)
+            for column in range(left >> _WIDE, (right - 1 >> _WIDE) + 1):
+                x = column << _WIDE
+                if end < len(records.tiles):
+                    corners = max(left - x, 0) | min(right - x, TILE_WIDTH) << 8 | high << 16 | low << 24
+                    records.tiles[end], records.corners[end] = row * columns + column, corners
+                    records.shapes[end] = shape
+                end += 1
+    return end
 
 
-@inlined
-def _count(boxes, first, last, counts, columns):
-    """Count the tiles of some boxes; returns how many of them are slow."""
-    slow = 0
-    for i in range(first, last):
-        left, right, top, bottom = _box(boxes, i)
-        if left < 0:
-            slow += 1
-        elif left < right and top < bottom:
-            for row in range(top >> _HIGH, (bottom - 1 >> _HIGH) + 1):
-                for column in range(left >> _WIDE, (right - 1 >> _WIDE) + 1):
-                    counts[np.uint64(row * columns + column)] += 1
-    return slow
+@borrowing
+def record_boxes(boxes, first, columns, records):
+    """Record shapes by their boxes, flat, the first of which has that number; returns as `bound`."""
+    end = 0
+    for k in range(np.uint64(len(boxes) // 4)):
+        end = _record(boxes, np.uint64(4) * k, np.uint64(1), np.int32(first + k), columns, records, end)
+    return end
 
 
-@inlined
-def _box(boxes, i):
-    box = np.uint64(4) * i
-    return (
-        boxes[box],
-        boxes[box + np.uint64(1)],
-        boxes[box + np.uint64(2)],
-        boxes[box + np.uint64(3)],
-    )
+@borrowing
+def count(records, end, counts):
+    """Count the records of each tile."""
+    for k in range(np.uint64(end)):
+        counts[np.uint64(records.tiles[k])] += 1
 
 
 @borrowing
@@ -94,18 +201,11 @@ def begin(counts, starts):
 
 
 @borrowing
-def fill(boxes, first, last, places, entries, columns):
-    """Put spheres first to last − 1 into the lists of their tiles; `places` is where each list goes on."""
-    for i in range(np.uint64(first), np.uint64(last)):
-        left, right, top, bottom = _box(boxes, i)
-        if 0 <= left < right and top < bottom:
-            for row in range(top >> _HIGH, (bottom - 1 >> _HIGH) + 1):
-                y = row << _HIGH
-                high, low = max(top - y, 0), min(bottom - y, TILE_HEIGHT)
-                for column in range(left >> _WIDE, (right - 1 >> _WIDE) + 1):
-                    x = column << _WIDE
-                    tile = np.uint64(row * columns + column)
-                    place = np.uint64(places[tile])
-                    corners = max(left - x, 0) | min(right - x, TILE_WIDTH) << 8 | high << 16 | low << 24
-                    entries[place] = np.uint64(corners) << np.uint64(32) | i
-                    places[tile] = place + np.uint64(1)
+def fill(records, end, places, entries):
+    """Put records into the lists of their tiles; `places` is where each list goes on."""
+    for k in range(np.uint64(end)):
+        tile = np.uint64(records.tiles[k])
+        place = np.uint64(places[tile])
+        entries[place] = np.uint64(np.uint32(records.corners[k])) << np.uint64(32) | np.uint64(records.shapes[k])
+        fetch_to_write(entries, place + np.uint64(8))
+        places[tile] = place + np.uint64(1)

@@ -170,7 +170,8 @@ for _symbol, _lower in (
     (np.floor, _instruction("llvm.floor")),
     (np.ceil, _instruction("llvm.ceil")),
 ):
-    _operator(_symbol, LANES, LANES, 1, _lower)
+    for _floats in FLOATS:
+        _operator(_symbol, _floats, _floats, 1, _lower)
 for _symbol, _sign in (
     (operator.lt, "<"),
     (operator.le, "<="),
@@ -186,6 +187,8 @@ _operator(operator.add, PLACES, PLACES, 2, ir.IRBuilder.add)
 _operator(operator.mul, PLACES, PLACES, 2, ir.IRBuilder.mul)
 for _symbol, _lower in (
     (operator.add, ir.IRBuilder.add),
+    (operator.sub, ir.IRBuilder.sub),
+    (operator.mul, ir.IRBuilder.mul),
     (operator.and_, ir.IRBuilder.and_),
     (operator.or_, ir.IRBuilder.or_),
     (operator.lshift, ir.IRBuilder.shl),

@@ -15,6 +15,7 @@ from raytracer.kernels.lanes import (
     FLOATS,
     INTEGERS,
     LANES,
+    MARKS,
     NUMBER_PAIRS,
     NUMBERS,
     PROCESSOR,
@@ -136,6 +137,54 @@ def lowest_bit(typing, bits):
         return builder.cttz(args[0], ir.Constant(_BIT, 1))
 
     return types.int32(types.int32), lower
+
+
+@intrinsic
+def count_ones(typing, bits):
+    """How many bits of a number are set."""
+    return bits(bits), lambda context, builder, sig, args: builder.ctpop(args[0])
+
+
+@intrinsic
+def singles(typing, a, b):
+    """Two times eight lanes of float64 as sixteen singles."""
+    return SINGLES(LANES, LANES), lambda context, builder, sig, args: _joined(
+        builder, [_halves(builder, lanes) for lanes in args]
+    )
+
+
+@intrinsic
+def ascending(typing):
+    """0 to 15."""
+    numbers = ir.Constant(NUMBERS.vector, list(range(SIXTEEN)))
+    return NUMBERS(), lambda context, builder, sig, args: numbers
+
+
+@intrinsic
+def store_some(typing, array, i, numbers, marks):
+    """Those of sixteen int32 that are marked, one behind the other from element i of an array on.
+
+    Of the fifteen elements behind them, anything may be left in some.
+    """
+
+    def lower(context, builder, sig, args):
+        array, i, numbers, marks = args
+        if PROCESSOR.get("avx512f"):
+            vector = NUMBERS.vector
+            kind = ir.FunctionType(vector, [vector, vector, marks.type])
+            compress = get_or_insert_function(builder.module, kind, "llvm.x86.avx512.mask.compress.v16i32")
+            # to memory, some processors do the same a hundred times slower
+            dense = builder.call(compress, [numbers, numbers, marks])
+            builder.store(dense, _address(context, builder, sig.args[0], array, i, vector), align=4)
+            return context.get_dummy_value()
+        first = context.make_array(sig.args[0])(context, builder, array).data
+        for lane in range(SIXTEEN):
+            place = ir.Constant(_INT32, lane)
+            builder.store(builder.extract_element(numbers, place), builder.gep(first, [i]))
+            i = builder.add(i, builder.zext(builder.extract_element(marks, place), i.type))
+        return context.get_dummy_value()
+
+    return types.void(array, types.uint64, NUMBERS, MARKS), lower
 
 
 @intrinsic

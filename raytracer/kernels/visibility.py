@@ -317,21 +317,28 @@ def candidates(slow, bins, xs, ys):
 @borrowing
 def _merge(slow, bins, x, y, ids, at):
     """Write a pixel's candidates, ascending, to `ids` from `at` on, if it has room; returns how many there are."""
-    tile, found, next_slow = y // TILE_HEIGHT * bins.columns + x // TILE_WIDTH, 0, 0
-    for place in range(bins.starts[tile], bins.starts[tile + 1] + 1):
-        last = place == bins.starts[tile + 1]
-        while next_slow < len(slow.ids) and (last or slow.ids[next_slow] < sphere_of(bins.entries[place])):
-            box = slow.boxes[next_slow]
-            if box[0] <= x and x < box[1] and box[2] <= y and y < box[3]:
-                if len(ids):
-                    ids[at + found] = slow.ids[next_slow]
-                found += 1
-            next_slow += 1
-        if not last and holds(bins.entries[place], x % TILE_WIDTH, y % TILE_HEIGHT):
-            if len(ids):
-                ids[at + found] = sphere_of(bins.entries[place])
+    tile, found = y // TILE_HEIGHT * bins.columns + x // TILE_WIDTH, 0
+    for i in range(len(slow.ids)):
+        box = slow.boxes[i]
+        if box[0] <= x and x < box[1] and box[2] <= y and y < box[3]:
+            _put_in_order(ids, at, found, slow.ids[i])
+            found += 1
+    for place in range(bins.starts[tile], bins.starts[tile + 1]):
+        if holds(bins.entries[place], x % TILE_WIDTH, y % TILE_HEIGHT):
+            _put_in_order(ids, at, found, np.int32(sphere_of(bins.entries[place])))
             found += 1
     return found
+
+
+@inlined
+def _put_in_order(ids, at, found, number):
+    """Put a number among the `found` ascending ones in `ids` from `at` on, if that has room."""
+    if len(ids):
+        place = at + found
+        while place > at and ids[place - 1] > number:
+            ids[place] = ids[place - 1]
+            place -= 1
+        ids[place] = number
 
 
 @inlined
