@@ -306,11 +306,11 @@ class Scratch(NamedTuple):
 
 
 class QuickScratch(NamedTuple):
-    """What `kernels.quick` writes on while it does a tile, in blocks of 4 × 4 pixels, row by row of blocks."""
+    """What `kernels.quick` writes on while it does a tile, in strips of 4 pixels, row by row of each strip."""
 
     depth: np.ndarray  # float32 (pixels,), k of the nearest hit so far
     number: np.ndarray  # int32 (pixels,): which of the tile's list that is, counted from 1, 0 for none
-    doubt: np.ndarray  # int32 (blocks,), a bit a pixel
+    doubt: np.ndarray  # int32 (rows of strips,), a bit a pixel
     table: np.ndarray  # float32, flat: eight numbers for each of the tile's list, for shading; the first row is free
     batch: np.ndarray  # float32, flat: what is computed of eight spheres at once, for drawing
     blocks: np.ndarray  # int32, which blocks of a line show anything: first those of one sphere, then others

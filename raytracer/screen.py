@@ -421,7 +421,7 @@ def _quick_scratch(workspace: Workspace, kernels: ModuleType, worker: int) -> Qu
     return QuickScratch(
         depth=array(pixels, np.float32, "depth"),
         number=array(pixels, np.int32, "number"),
-        doubt=array(blocks, np.int32, "doubt"),
+        doubt=array(pixels // 4, np.int32, "doubt"),
         table=array(8 * (kernels.MOST + 16), np.float32, "table"),
         batch=array(160, np.float32, "batch"),
         blocks=array(line, np.int32, "blocks"),

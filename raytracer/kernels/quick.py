@@ -1,15 +1,16 @@
 """A tile of small spheres in single precision: sixteen pixels at a time, and float64 for those that are not certain.
 
-    list of the tile ── _look ──> batch   what is drawn of eight spheres      ┌ blocks of 4 × 4 pixels ─┐
-                                  table   what is shaded, a row a sphere      │ 0 1 2 3 │ 16 17 … │     │
-    batch  ── _draw  ──> depth    k of the nearest hit so far                 │ 4 5 6 7 │         │     │
-                         number   which of the list that is                   │ …       │         │     │
+    list of the tile ── _look ──> batch   what is drawn of eight spheres      ┌ strips, 4 pixels wide ──┐
+                                  table   what is shaded, a row a sphere      │ 0 1 2 3 │ 128 129 … │   │
+    batch  ── _draw  ──> depth    k of the nearest hit so far                 │ 4 5 6 7 │ 132       │   │
+                         number   which of the list that is                   │ …       │ …         │   │
                          doubt    where single precision cannot tell          └─────────────────────────┘
     doubt  ── _decide ─> number   in float64
     number ── _shade ──> colours of a line of blocks; those too close to another byte by shade_anew, in float64
     colours ─ _put   ──> bytes of the picture
 
-The formulas and the bounds of their errors are those of `quick`.
+So 4 × 4 pixels are sixteen numbers in a row, from whichever row of the tile on. The formulas and the bounds of their
+errors are those of `quick`.
 """
 
 import numpy as np
@@ -58,13 +59,14 @@ from raytracer.kernels.sixteen import (
     whole_numbers,
 )
 from raytracer.kernels.surfaces import diffuse_at, meet_spheres
-from raytracer.kernels.visibility import AHEAD, corners_of, fetch, from_eye, holds, sphere_of
+from raytracer.kernels.visibility import AHEAD, corners_of, fetch, from_eye, sphere_of
 from raytracer.quick import ONE_BYTE, coarseness_of, error_of, flatness_of, near_of
 from raytracer.shading import to_byte
 
 MOST = 1 << 12  # spheres of a tile's list; of more, the table would leave the core's caches
 FEW_LATE = 256  # pixels to be shaded in float64: enough for a while
-_BLOCKS = TILE_WIDTH // SIDE  # side by side
+_BLOCKS = TILE_WIDTH // SIDE  # side by side: strips
+_STRIP = SIDE * TILE_HEIGHT  # pixels of a strip
 _LINE = SIXTEEN * _BLOCKS  # pixels of a line of blocks
 _PIXELS, _MIDDLE, _MIDDLE_Y = np.uint64(TILE_WIDTH * TILE_HEIGHT), TILE_WIDTH // 2, TILE_HEIGHT // 2
 _LIGHT = np.uint64(8)  # numbers a light
@@ -174,24 +176,34 @@ def _draw(entry, number, j, tie, sheet):
     k2, radius, rim = b[np.uint64(96) + j], b[np.uint64(104) + j], b[np.uint64(112) + j]
     own = sixteen(number)
     left, right = start // SIDE, (stop + SIDE - 1) // SIDE
-    for line in range(high // SIDE, (low + SIDE - 1) // SIDE):
-        y = rows + (np.float32(SIDE * line - _MIDDLE_Y) - b[np.uint64(16) + j])
-        of_row, slope = times_plus(y, e2 - y * yy, spread(middle)), e1 - y * xy
+    lines = (low - high + SIDE - 1) // SIDE
+    top = min(high, TILE_HEIGHT - SIDE * lines)
+    for line in range(top, top + SIDE * lines, SIDE):
+        y = rows + (np.float32(line - _MIDDLE_Y) - b[np.uint64(16) + j])
+        of_row, slope = times_plus(y, times_plus(y, -yy, spread(e2)), spread(middle)), times_plus(y, -xy, spread(e1))
         k_row, shift = times_plus(y, spread(k2), spread(k0)), np.float32(SIDE * left - _MIDDLE) - b[j]
-        p = np.uint64(SIXTEEN * (line * _BLOCKS + left))
+        p = np.uint64(_STRIP * left + SIDE * line)
         for _ in range(right - left):
             x, best = columns + shift, load(sheet.depth, p)
-            disc = times_plus(x, slope - x * xx, of_row)
-            k = times_plus(x, spread(k1), k_row) - _root(disc, rough_inverse_root(disc)) * radius
+            disc = times_plus(x, times_plus(x, -xx, slope), of_row)
+            root = _root(disc, rough_inverse_root(disc))
+            k = times_plus(root, -radius, times_plus(x, spread(k1), k_row))
             wins = k < best
             store(sheet.depth, p, blend(wins, k, best))
             store(sheet.number, p, blend(wins, own, load_numbers(sheet.number, p)))
             if certain:
                 unsure = (abs(disc) <= rim) | (abs(k - best) <= k * tie)
                 if any_of(unsure):
-                    sheet.doubt[p // _SIXTEEN] |= bits_of(unsure)
+                    _doubt(sheet, p, bits_of(unsure))
             shift += _STEP
-            p += _SIXTEEN
+            p += np.uint64(_STRIP)
+
+
+@inlined
+def _doubt(sheet, p, bits):
+    """Mark sixteen pixels, by the rows of their strip."""
+    for row in range(np.uint64(SIDE)):
+        sheet.doubt[p // np.uint64(SIDE) + row] |= bits >> SIDE * row & (1 << SIDE) - 1
 
 
 @inlined
@@ -206,14 +218,14 @@ def _decide(view, bins, tile, sheet, doubts):
     """Decide in float64 what single precision could not tell, and list what float64 cannot tell either."""
     width = len(view.across) - WIDTH
     for some in range(np.uint64(0), np.uint64(len(sheet.doubt)), _SIXTEEN):
-        blocks = np.int32(bits_of(load_numbers(sheet.doubt, some) > 0))
-        while blocks:
-            block = some + np.uint64(lowest_bit(blocks))
-            blocks &= blocks - 1
-            bits = sheet.doubt[block]
-            sheet.doubt[block] = 0
+        rows = np.int32(bits_of(load_numbers(sheet.doubt, some) > 0))
+        while rows:
+            row = some + np.uint64(lowest_bit(rows))
+            rows &= rows - 1
+            bits = sheet.doubt[row]
+            sheet.doubt[row] = 0
             while bits:
-                p = np.int32(block) * SIXTEEN + lowest_bit(bits)
+                p = np.int32(row) * SIDE + lowest_bit(bits)
                 bits &= bits - 1
                 x, y = _pixel(p)
                 if _is_in(tile, x, y):
@@ -226,9 +238,8 @@ def _decide(view, bins, tile, sheet, doubts):
 
 @inlined
 def _pixel(p):
-    """Column and row of pixel p of the blocks."""
-    block, lane = p // SIXTEEN, p % SIXTEEN
-    return block % _BLOCKS * SIDE + lane % SIDE, block // _BLOCKS * SIDE + lane // SIDE
+    """Column and row of pixel p of the strips."""
+    return p // _STRIP * SIDE + p % SIDE, p // SIDE % TILE_HEIGHT
 
 
 @inlined
@@ -237,23 +248,34 @@ def _is_in(tile, x, y):
     return tile.left + x < tile.right and tile.top + y < tile.bottom
 
 
+@inlined
+def _holding(entries, place, x, y):
+    """Which of eight list entries have a box that a tile's pixel is in: two bits each, the upper one or none."""
+    boxes = load_numbers(entries, place)
+    columns = ((boxes & 255) <= x) & ((boxes >> 8 & 255) > x)
+    rows = ((boxes >> 16 & 255) <= y) & (boxes >> 24 > y)
+    return np.int32(bits_of(columns & rows)) & 0xAAAA
+
+
 @borrowing
 def _first_of(view, bins, tile, x, y):
     """Which of a tile's list one of its pixels sees, counted from 1; and whether float64 cannot tell."""
     best, number, unsure, balls = np.inf, 0, False, view.balls
     across, up, row = view.across[tile.left + x], view.up[tile.top + y], tile.top + y
     a = (across * view.a2 + view.a1[row]) * across + view.a0[row]
-    for place in range(bins.starts[tile.number], bins.middles[tile.number]):
-        entry = bins.entries[place]
-        if not holds(entry, x, y):
-            continue
-        i = np.uint64(4) * sphere_of(entry)
-        radius = balls[i + np.uint64(3)]
-        hu, hv, hw, c, edge = from_eye(view, balls[i], balls[i + _ONE], balls[i + np.uint64(2)], radius)
-        k, wins, doubt = approach(across * hu + (up * hv + hw), a, c, edge, best)
-        unsure |= doubt
-        if wins:
-            best, number = k, place - bins.starts[tile.number] + 1
+    first, end = bins.starts[tile.number], bins.middles[tile.number]
+    for some in range(first, end, WIDTH):
+        bits = _holding(bins.entries, np.uint64(some), x, y) & (1 << 2 * min(end - some, WIDTH)) - 1
+        while bits:
+            place = some + lowest_bit(bits) // 2
+            bits &= bits - 1
+            i = np.uint64(4) * sphere_of(bins.entries[place])
+            radius = balls[i + np.uint64(3)]
+            hu, hv, hw, c, edge = from_eye(view, balls[i], balls[i + _ONE], balls[i + np.uint64(2)], radius)
+            k, wins, doubt = approach(across * hu + (up * hv + hw), a, c, edge, best)
+            unsure |= doubt
+            if wins:
+                best, number = k, place - first + 1
     return number, unsure
 
 
@@ -271,22 +293,23 @@ def _colour_all(view, bins, tile, coarsest, paints, sheet, out):
 @inlined
 def _flat(tile, line, limits, quick, sheet, close):
     """One colour wherever anything is hit."""
-    p, flat, background = np.uint64(_LINE * line), sixteen(quick.flat), sixteen(quick.background)
-    for at in range(np.uint64(0), np.uint64(_LINE), _SIXTEEN):
-        store(sheet.colour, at, blend(load_numbers(sheet.number, p + at) > 0, flat, background))
+    start, flat, background = np.uint64(SIXTEEN * line), sixteen(quick.flat), sixteen(quick.background)
+    for block in range(np.uint64(_BLOCKS)):
+        hit = load_numbers(sheet.number, start + block * np.uint64(_STRIP)) > 0
+        store(sheet.colour, block * _SIXTEEN, blend(hit, flat, background))
     return close
 
 
 def _shade(tile, line, limits, quick, sheet, close):
     """`stages.diffuse`. Returns how many blocks have been listed that have pixels close to another byte."""
-    start = np.uint64(_LINE * line)
+    start = np.uint64(SIXTEEN * line)
     alike, mixed = _sort_blocks(start, sixteen(quick.background), sheet)
     y = both(rows_of_block()) + np.float32(SIDE * line)
     v, y = np.float32(quick.middle_y - tile.top) - y, y - _MIDDLE_Y
     left = np.float32(tile.left - quick.middle_x)
     for k in range(np.uint64(0), alike + mixed, np.uint64(2)):
         one, other = np.uint64(sheet.blocks[k]), np.uint64(sheet.blocks[k + _ONE])
-        p, q = start + one * _SIXTEEN, start + other * _SIXTEEN
+        p, q = start + one * np.uint64(_STRIP), start + other * np.uint64(_STRIP)
         if k < alike:
             spread_rows(sheet.table, sheet.firsts[k], sheet.firsts[k + _ONE], sheet.columns)
         else:
@@ -312,11 +335,11 @@ def _sort_blocks(start, background, sheet):
     """
     alike, mixed = np.uint64(0), np.uint64(0)
     for block in range(np.uint64(_BLOCKS)):
-        at = block * _SIXTEEN
-        store(sheet.colour, at, background)
-        numbers = load_numbers(sheet.number, start + at)
+        p = start + block * np.uint64(_STRIP)
+        store(sheet.colour, block * _SIXTEEN, background)
+        numbers = load_numbers(sheet.number, p)
         hit = bits_of(numbers > 0)
-        first = sheet.number[start + at + np.uint64(lowest_bit(np.int32(hit) | 0x10000) & 15)]
+        first = sheet.number[p + np.uint64(lowest_bit(np.int32(hit) | 0x10000) & 15)]
         is_alike = bits_of(numbers == first) == hit  # never where nothing is hit
         sheet.blocks[alike], sheet.firsts[alike], sheet.mixed[mixed] = block, first, block
         alike += np.uint64(is_alike)
