@@ -16,7 +16,17 @@ import numpy as np
 from raytracer.boxes import beside, box_of
 from raytracer.certified import edge_of, side_of
 from raytracer.kernels.compiler import borrowing, inlined
-from raytracer.kernels.lanes import SIXTEEN, WIDTH, all_of, bits_of, fetch_to_write, load_rows, store, store_boxes
+from raytracer.kernels.lanes import (
+    SIXTEEN,
+    WIDTH,
+    all_of,
+    any_of,
+    bits_of,
+    fetch_to_write,
+    load_rows,
+    store,
+    store_boxes,
+)
 from raytracer.kernels.sixteen import (
     ascending,
     count_ones,
@@ -80,27 +90,40 @@ def _bound_sixteen(near, eye, balls, i, columns, records, end, boxes):
     if odd:
         return odd, end
     shown = ahead & (left < right) & (top < bottom)
-    left, right, top, bottom = whole_numbers(left), whole_numbers(right), whole_numbers(top), whole_numbers(bottom)
-    column, row = left >> _WIDE, top >> _HIGH
-    within = shown & (right - 1 >> _WIDE == column) & (bottom - 1 >> _HIGH == row)
-    bits = np.int32(bits_of(within))
-    if end + SIXTEEN <= len(records.tiles):
-        x, y, at = column << _WIDE, row << _HIGH, np.uint64(end)
-        store_some(records.tiles, at, row * columns + column, within)
-        store_some(records.corners, at, left - x | right - x << 8 | top - y << 16 | bottom - y << 24, within)
-        store_some(records.shapes, at, ascending() + np.int32(i), within)
-    end += count_ones(bits)
-    across = np.int32(bits_of(shown)) & ~bits
-    if across:
+    box = whole_numbers(left), whole_numbers(right), whole_numbers(top), whole_numbers(bottom)
+    left, right, top, bottom = box
+    column, row, shapes = left >> _WIDE, top >> _HIGH, ascending() + np.int32(i)
+    beside, below = (right - 1 >> _WIDE) - column, (bottom - 1 >> _HIGH) - row
+    few, right_too, below_too = shown & (beside < 2) & (below < 2), beside == 1, below == 1
+    end = _record_some(box, column, row, few, shapes, columns, records, end)
+    end = _record_some(box, column, row + 1, few & below_too, shapes, columns, records, end)
+    if any_of(few & right_too):
+        end = _record_some(box, column + 1, row, few & right_too, shapes, columns, records, end)
+        end = _record_some(box, column + 1, row + 1, few & right_too & below_too, shapes, columns, records, end)
+    many = np.int32(bits_of(shown & ~few))
+    if many:
         store(boxes, 0, left)
         store(boxes, SIXTEEN, right)
         store(boxes, 2 * SIXTEEN, top)
         store(boxes, 3 * SIXTEEN, bottom)
-    while across:
-        lane = np.uint64(lowest_bit(across))
-        across &= across - 1
+    while many:
+        lane = np.uint64(lowest_bit(many))
+        many &= many - 1
         end = _record(boxes, lane, np.uint64(SIXTEEN), np.int32(i + lane), columns, records, end)
     return np.int32(0), end
+
+
+@inlined
+def _record_some(box, column, row, which, shapes, columns, records, end):
+    """Record some of sixteen shapes, each in the tile of that column and row; returns the new end."""
+    if end + SIXTEEN <= len(records.tiles):
+        (left, right, top, bottom), x, y, at = box, column << _WIDE, row << _HIGH, np.uint64(end)
+        left, right = greater(left - x, 0), lesser(right - x, TILE_WIDTH)
+        high, low = greater(top - y, 0), lesser(bottom - y, TILE_HEIGHT)
+        store_some(records.tiles, at, row * columns + column, which)
+        store_some(records.corners, at, left | right << 8 | high << 16 | low << 24, which)
+        store_some(records.shapes, at, shapes, which)
+    return end + count_ones(np.int32(bits_of(which)))
 
 
 @inlined

@@ -59,7 +59,7 @@ from raytracer.kernels.sixteen import (
     whole_numbers,
 )
 from raytracer.kernels.surfaces import diffuse_at, meet_spheres
-from raytracer.kernels.visibility import AHEAD, corners_of, fetch, from_eye, sphere_of
+from raytracer.kernels.visibility import AHEAD, corners_of, fetch, from_eye, holding, sphere_of
 from raytracer.quick import ONE_BYTE, coarseness_of, error_of, flatness_of, near_of
 from raytracer.shading import to_byte
 
@@ -248,15 +248,6 @@ def _is_in(tile, x, y):
     return tile.left + x < tile.right and tile.top + y < tile.bottom
 
 
-@inlined
-def _holding(entries, place, x, y):
-    """Which of eight list entries have a box that a tile's pixel is in: two bits each, the upper one or none."""
-    boxes = load_numbers(entries, place)
-    columns = ((boxes & 255) <= x) & ((boxes >> 8 & 255) > x)
-    rows = ((boxes >> 16 & 255) <= y) & (boxes >> 24 > y)
-    return np.int32(bits_of(columns & rows)) & 0xAAAA
-
-
 @borrowing
 def _first_of(view, bins, tile, x, y):
     """Which of a tile's list one of its pixels sees, counted from 1; and whether float64 cannot tell."""
@@ -265,7 +256,7 @@ def _first_of(view, bins, tile, x, y):
     a = (across * view.a2 + view.a1[row]) * across + view.a0[row]
     first, end = bins.starts[tile.number], bins.middles[tile.number]
     for some in range(first, end, WIDTH):
-        bits = _holding(bins.entries, np.uint64(some), x, y) & (1 << 2 * min(end - some, WIDTH)) - 1
+        bits = holding(bins.entries, some, end, x, y)
         while bits:
             place = some + lowest_bit(bits) // 2
             bits &= bits - 1

@@ -104,9 +104,10 @@ def _choice(sign):
     """Of two the one that a comparison names."""
 
     def make(typing, a, b):
-        kind = _first(FLOATS, a, b)
+        kind = _first(FLOATS + INTEGERS, a, b)
+        compare = ir.IRBuilder.icmp_signed if kind in INTEGERS else ir.IRBuilder.fcmp_ordered
         return kind(kind, kind), lambda context, builder, sig, args: builder.select(
-            builder.fcmp_ordered(sign, *args), *args
+            compare(builder, sign, *args), *args
         )
 
     return make
