@@ -309,17 +309,19 @@ class QuickScratch(NamedTuple):
     """What `kernels.quick` writes on while it does a tile, in strips of 4 pixels, row by row of each strip."""
 
     depth: np.ndarray  # float32 (pixels,), k of the nearest hit so far
+    colour: (
+        np.ndarray
+    )  # int32 (pixels,), in the same memory, when the depth is of no use any more: red in the lowest byte
     number: np.ndarray  # int32 (pixels,): which of the tile's list that is, counted from 1, 0 for none
     doubt: np.ndarray  # int32 (rows of strips,), a bit a pixel
     table: np.ndarray  # float32, flat: eight numbers for each of the tile's list, for shading; the first row is free
     batch: np.ndarray  # float32, flat: what is computed of eight spheres at once, for drawing
-    blocks: np.ndarray  # int32, which blocks of a line show anything: first those of one sphere, then others
+    blocks: np.ndarray  # int32, the first pixel of blocks that show anything: first those of one sphere, then others
     firsts: np.ndarray  # int32, which sphere that is
     mixed: np.ndarray  # int32, the others
     columns: np.ndarray  # float32 (8 · 32,), the columns of the table for the pixels of two blocks
-    colour: np.ndarray  # int32, the colours of a line of blocks, red in the lowest byte
-    close: np.ndarray  # int32 (blocks + 2,), the first pixel of blocks that have pixels close to another byte
-    bits: np.ndarray  # int32 (blocks + 2,), a bit for each of those
+    close: np.ndarray  # int32, the first pixel of blocks that have pixels close to another byte
+    bits: np.ndarray  # int32, a bit for each of those
     late: np.ndarray  # int64 (1,), how many pixels are to be shaded in float64
     late_columns: np.ndarray  # int32: those
     late_rows: np.ndarray  # int32

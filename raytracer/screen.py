@@ -413,24 +413,25 @@ def _new_desk(workspace: Workspace, kernels: ModuleType, worker: int) -> Desk:
 
 def _quick_scratch(workspace: Workspace, kernels: ModuleType, worker: int) -> QuickScratch:
     pixels, blocks = kernels.TILE_HEIGHT * kernels.TILE_WIDTH, kernels.TILE_HEIGHT * kernels.TILE_WIDTH // 16
-    line, late = 4 * kernels.TILE_WIDTH, 2 * pixels
+    late, room = 2 * pixels, blocks + 4
 
     def array(size: int, kind: type, name: str) -> np.ndarray:
         return workspace.zeros(size, kind, f"quick {name}", worker)
 
+    depth = array(pixels, np.float32, "depth")
     return QuickScratch(
-        depth=array(pixels, np.float32, "depth"),
+        depth=depth,
+        colour=depth.view(np.int32),
         number=array(pixels, np.int32, "number"),
         doubt=array(pixels // 4, np.int32, "doubt"),
         table=array(8 * (kernels.MOST + 16), np.float32, "table"),
         batch=array(160, np.float32, "batch"),
-        blocks=array(line, np.int32, "blocks"),
-        firsts=array(line, np.int32, "firsts"),
-        mixed=array(line, np.int32, "mixed"),
+        blocks=array(room, np.int32, "blocks"),
+        firsts=array(room, np.int32, "firsts"),
+        mixed=array(room, np.int32, "mixed"),
         columns=array(8 * 32, np.float32, "columns"),
-        colour=array(line, np.int32, "colour"),
-        close=array(blocks + 2, np.int32, "close"),
-        bits=array(blocks + 2, np.int32, "bits"),
+        close=array(room, np.int32, "close"),
+        bits=array(room, np.int32, "bits"),
         late=array(1, np.int64, "late"),
         late_columns=array(late, np.int32, "late columns"),
         late_rows=array(late, np.int32, "late rows"),
@@ -502,8 +503,8 @@ def _sort(
         """Find a part's records, anew if there was no room for all of them."""
         room = _records(workspace, part, guess)
         end = find(room)
-        if end > len(room.tiles):
-            room = _records(workspace, part, end)
+        if end + kernels.SIXTEEN > len(room.tiles):
+            room = _records(workspace, part, end + kernels.SIXTEEN)
             find(room)
         records[part], ends[part] = room, end
         kernels.count(room, end, counts[part])

@@ -276,7 +276,7 @@ def test_a_table_of_eight_columns():
 def test_a_row_of_four_blocks_as_bytes(step):
     @borrowing
     def run(picture, step, colours):
-        s.put_sixteen(picture, np.uint64(step), np.uint64(step), colours, np.uint64(4))
+        s.put_sixteen(picture, np.uint64(step), np.uint64(step), colours, np.uint64(4), np.uint64(16))
 
     rng = np.random.default_rng(2)
     colours = rng.integers(0, 1 << 24, (4, 4, 4), dtype=np.int32)  # block, row, column

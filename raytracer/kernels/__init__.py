@@ -8,6 +8,7 @@ with cache_named_after_sources():
     from raytracer.kernels.cells import bound_images, sort_into_cells
     from raytracer.kernels.facets import see_facets
     from raytracer.kernels.full import radiance_of
+    from raytracer.kernels.lanes import SIXTEEN
     from raytracer.kernels.quick import MOST
     from raytracer.kernels.reading import read_plain
     from raytracer.kernels.surfaces import diffuse_of
@@ -30,6 +31,7 @@ with cache_named_after_sources():
 __all__ = [
     "MOST",
     "ROOM",
+    "SIXTEEN",
     "STRIDE",
     "TILE_HEIGHT",
     "TILE_WIDTH",

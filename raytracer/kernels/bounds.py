@@ -56,8 +56,9 @@ _ZERO, _UNIT, _FOUR = np.float32(0.0), np.float32(1.0), np.float32(4.0)
 def bound(near, lens, eye, reach, kappa, balls, first, last, columns, records, slow, boxes):
     """Records of spheres first to last − 1, first being a multiple of 8, and in `slow` which of them are slow.
 
-    Returns how many records there are, or would be if there was room, and how many slow ones. balls has room for whole
-    eights, slow for all of those spheres, boxes for 64 numbers; columns is how many tiles lie side by side.
+    Returns how many records there are, or would be if there was room for them and SIXTEEN more, and how many slow ones.
+    balls has room for whole eights, slow for all of those spheres, boxes for 64 numbers; columns is how many tiles lie
+    side by side.
     """
     end, slows, i = 0, 0, np.uint64(first)
     while i < last:

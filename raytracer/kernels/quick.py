@@ -6,8 +6,8 @@
                          number   which of the list that is                   │ …       │ …         │   │
                          doubt    where single precision cannot tell          └─────────────────────────┘
     doubt  ── _decide ─> number   in float64
-    number ── _shade ──> colours of a line of blocks; those too close to another byte by shade_anew, in float64
-    colours ─ _put   ──> bytes of the picture
+    number ── _shade ──> colour   where the depth was; what is too close to another byte by shade_anew, in float64
+    colour ── _put   ──> bytes of the picture
 
 So 4 × 4 pixels are sixteen numbers in a row, from whichever row of the tile on. The formulas and the bounds of their
 errors are those of `quick`.
@@ -65,9 +65,7 @@ from raytracer.shading import to_byte
 
 MOST = 1 << 12  # spheres of a tile's list; of more, the table would leave the core's caches
 FEW_LATE = 256  # pixels to be shaded in float64: enough for a while
-_BLOCKS = TILE_WIDTH // SIDE  # side by side: strips
 _STRIP = SIDE * TILE_HEIGHT  # pixels of a strip
-_LINE = SIXTEEN * _BLOCKS  # pixels of a line of blocks
 _PIXELS, _MIDDLE, _MIDDLE_Y = np.uint64(TILE_WIDTH * TILE_HEIGHT), TILE_WIDTH // 2, TILE_HEIGHT // 2
 _LIGHT = np.uint64(8)  # numbers a light
 _ONE, _SIXTEEN = np.uint64(1), np.uint64(SIXTEEN)
@@ -271,44 +269,45 @@ def _first_of(view, bins, tile, x, y):
 
 
 def _colour_all(view, bins, tile, coarsest, paints, sheet, out):
-    """Colours and bytes, a line of blocks after the other; meanwhile the processor fetches where the next one goes."""
+    """Colours, and then bytes."""
     align_stack()
-    limits, count = _limits(paints.quick, tile, coarsest), 0
-    for line in range((tile.bottom - tile.top + SIDE - 1) // SIDE):
-        _fetch_pixels(tile, line + 1, out)
-        count = colour_line(tile, line, limits, paints.quick, sheet, count)
-        _put(tile, line, sheet, out)
+    count = colour_tile(tile, _limits(paints.quick, tile, coarsest), paints.quick, sheet, out)
+    _put(tile, sheet, out)
     _keep_for_later(bins, tile, count, sheet)
 
 
 @inlined
-def _flat(tile, line, limits, quick, sheet, close):
+def _flat(tile, limits, quick, sheet, out):
     """One colour wherever anything is hit."""
-    start, flat, background = np.uint64(SIXTEEN * line), sixteen(quick.flat), sixteen(quick.background)
-    for block in range(np.uint64(_BLOCKS)):
-        hit = load_numbers(sheet.number, start + block * np.uint64(_STRIP)) > 0
-        store(sheet.colour, block * _SIXTEEN, blend(hit, flat, background))
-    return close
+    flat, background = sixteen(quick.flat), sixteen(quick.background)
+    for p in range(np.uint64(0), _PIXELS, _SIXTEEN):
+        store(sheet.colour, p, blend(load_numbers(sheet.number, p) > 0, flat, background))
+    return 0
 
 
-def _shade(tile, line, limits, quick, sheet, close):
-    """`stages.diffuse`. Returns how many blocks have been listed that have pixels close to another byte."""
-    start = np.uint64(SIXTEEN * line)
-    alike, mixed = _sort_blocks(start, sixteen(quick.background), sheet)
-    y = both(rows_of_block()) + np.float32(SIDE * line)
-    v, y = np.float32(quick.middle_y - tile.top) - y, y - _MIDDLE_Y
-    left = np.float32(tile.left - quick.middle_x)
+def _shade(tile, limits, quick, sheet, out):
+    """`stages.diffuse`; meanwhile the processor fetches where the bytes go.
+
+    Returns how many blocks have been listed that have pixels close to another byte.
+    """
+    (alike, mixed), close = _sort_blocks(sixteen(quick.background), sheet), 0
+    columns, rows = both(columns_of_block()) - _MIDDLE, both(rows_of_block()) - _MIDDLE_Y
+    left, up = np.float32(tile.left + _MIDDLE - quick.middle_x), np.float32(quick.middle_y - tile.top - _MIDDLE_Y)
+    row = tile.top
     for k in range(np.uint64(0), alike + mixed, np.uint64(2)):
-        one, other = np.uint64(sheet.blocks[k]), np.uint64(sheet.blocks[k + _ONE])
-        p, q = start + one * np.uint64(_STRIP), start + other * np.uint64(_STRIP)
+        if row < tile.bottom:
+            _fetch_row(tile, row, out)
+            row += 1
+        p, q = np.uint64(sheet.blocks[k]), np.uint64(sheet.blocks[k + _ONE])
         if k < alike:
             spread_rows(sheet.table, sheet.firsts[k], sheet.firsts[k + _ONE], sheet.columns)
         else:
             gather_to_columns(sheet.table, sheet.number, p, q, sheet.columns)
-        x = both(columns_of_block()) + two(np.float32(np.int64(one) * SIDE), np.float32(np.int64(other) * SIDE))
-        red, green, blue, error, none = _light(quick, sheet, x - _MIDDLE, y, x + left, v, limits)
+        (x, y), (x2, y2) = _pixel(np.int64(p)), _pixel(np.int64(q))
+        x, y = columns + two(np.float32(x), np.float32(x2)), rows + two(np.float32(y), np.float32(y2))
+        red, green, blue, error, none = _light(quick, sheet, x, y, x + left, up - y, limits)
         colour, hit = red >> 16 | (green >> 8 & 0xFF00) | (blue & 0xFF0000), load_two(sheet.number, p, q) > 0
-        store_pair(sheet.colour, one * _SIXTEEN, other * _SIXTEEN, blend(hit, colour, quick.background))
+        store_pair(sheet.colour, p, q, blend(hit, colour, quick.background))
         if certain:
             bits = bits_of(
                 hit & (none | _is_close(red, error[0]) | _is_close(green, error[1]) | _is_close(blue, error[2]))
@@ -319,20 +318,19 @@ def _shade(tile, line, limits, quick, sheet, close):
 
 
 @inlined
-def _sort_blocks(start, background, sheet):
-    """List the blocks of a line that show but one sphere, and which, then those that show several.
+def _sort_blocks(background, sheet):
+    """List the blocks of 4 × 4 pixels that show but one sphere, and which, then those that show several.
 
     Returns how many they are, whole pairs both; what shows nothing becomes background.
     """
     alike, mixed = np.uint64(0), np.uint64(0)
-    for block in range(np.uint64(_BLOCKS)):
-        p = start + block * np.uint64(_STRIP)
-        store(sheet.colour, block * _SIXTEEN, background)
+    for p in range(np.uint64(0), _PIXELS, _SIXTEEN):
+        store(sheet.colour, p, background)
         numbers = load_numbers(sheet.number, p)
-        hit = bits_of(numbers > 0)
-        first = sheet.number[p + np.uint64(lowest_bit(np.int32(hit) | 0x10000) & 15)]
+        hit = np.int32(bits_of(numbers > 0))
+        first = sheet.number[p + np.uint64(lowest_bit(hit | 1 << SIXTEEN) % SIXTEEN)]
         is_alike = bits_of(numbers == first) == hit  # never where nothing is hit
-        sheet.blocks[alike], sheet.firsts[alike], sheet.mixed[mixed] = block, first, block
+        sheet.blocks[alike], sheet.firsts[alike], sheet.mixed[mixed] = p, first, p
         alike += np.uint64(is_alike)
         mixed += np.uint64((hit > 0) & (not is_alike))
     sheet.blocks[alike] = sheet.blocks[max(alike, _ONE) - _ONE]
@@ -471,32 +469,26 @@ def put_pixel(out, start, colour):
 
 
 @inlined
-def _fetch_pixels(tile, line, out):
-    """A line of blocks will be written to."""
-    width = np.uint64((tile.right - tile.left) * out.pixel_bytes)
-    for row in range(tile.top + SIDE * line, min(tile.top + SIDE * line + SIDE, tile.bottom)):
-        start = np.uint64((row - out.first_row) * out.row_bytes + tile.left * out.pixel_bytes)
-        for at in range(np.uint64(0), width, np.uint64(64)):
-            fetch_to_write(out.bytes, start + at)
+def _fetch_row(tile, row, out):
+    """A row of a tile will be written to."""
+    start = np.uint64((row - out.first_row) * out.row_bytes + tile.left * out.pixel_bytes)
+    for at in range(np.uint64(0), np.uint64((tile.right - tile.left) * out.pixel_bytes), np.uint64(64)):
+        fetch_to_write(out.bytes, start + at)
 
 
 @inlined
-def _put(tile, line, sheet, out):
-    """A line of blocks as bytes of the picture."""
+def _put(tile, sheet, out):
+    """A tile's colours as bytes of the picture."""
     step, right = np.uint64(out.pixel_bytes), min(tile.right, out.columns)
-    for row in range(min(SIDE, tile.bottom - tile.top - SIDE * line)):
-        top = tile.top + SIDE * line + row - out.first_row
-        start = np.uint64(top * out.row_bytes + tile.left * out.pixel_bytes)
+    for row in range(tile.bottom - tile.top):
+        start = np.uint64((tile.top + row - out.first_row) * out.row_bytes + tile.left * out.pixel_bytes)
         x, p = tile.left, np.uint64(SIDE * row)
         while x + SIXTEEN <= right:
-            put_sixteen(out.bytes, start, step, sheet.colour, p)
-            x, start, p = x + SIXTEEN, start + _SIXTEEN * step, p + np.uint64(SIXTEEN * SIDE)
-        for pixel in range(np.uint64(tile.right - x)):
-            put_pixel(
-                out,
-                start + pixel * step,
-                sheet.colour[p + pixel // np.uint64(SIDE) * _SIXTEEN + pixel % np.uint64(SIDE)],
-            )
+            put_sixteen(out.bytes, start, step, sheet.colour, p, np.uint64(_STRIP))
+            x, start, p = x + SIXTEEN, start + _SIXTEEN * step, p + np.uint64(SIXTEEN // SIDE * _STRIP)
+        for pixel in range(tile.right - x):
+            put_pixel(out, start, sheet.colour[p + np.uint64(pixel // SIDE * _STRIP + pixel % SIDE)])
+            start += step
 
 
 @inlined
@@ -513,16 +505,16 @@ _draw_certain = variant(_draw_all, "_draw_certain", draw=_certain_sphere, look=_
 _draw_unchecked = variant(_draw_all, "_draw_unchecked", draw=_unchecked_sphere, look=_look_at_all)
 _shade_certain = variant(_shade, "_shade_certain", inlined, certain=True)
 _shade_unchecked = variant(_shade, "_shade_unchecked", inlined, certain=False)
-_colour_flat = variant(_colour_all, "_colour_flat", colour_line=_flat)
+_colour_flat = variant(_colour_all, "_colour_flat", colour_tile=_flat)
 _colour_certain = variant(
     _colour_all,
     "_colour_certain",
-    colour_line=_shade_certain,
+    colour_tile=_shade_certain,
 )
 _colour_unchecked = variant(
     _colour_all,
     "_colour_unchecked",
-    colour_line=_shade_unchecked,
+    colour_tile=_shade_unchecked,
 )
 flat_quickly = variant(_paint_tile, "flat_quickly", draw_all=_draw_shapes, colour_all=_colour_flat, certain=True)
 diffuse_quickly = variant(

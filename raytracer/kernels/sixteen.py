@@ -370,22 +370,22 @@ def _four_columns(builder, rows):
 
 
 @intrinsic
-def put_sixteen(typing, picture, start, step, colours, at):
+def put_sixteen(typing, picture, start, step, colours, at, apart):
     """Sixteen pixels of a row as bytes, from byte `start` of a flat picture on; a pixel takes `step` bytes, 3 or 4.
 
-    They come from four blocks that lie side by side, int32 with red in the lowest byte, the first from element `at` on.
-    A fourth byte stays what it is.
+    Four and four of them lie together, int32 with red in the lowest byte, the first from element `at` on and the next
+    so far apart. A fourth byte stays what it is.
     """
 
     def lower(context, builder, sig, args):
-        picture, start, step, colours, at = args
+        picture, start, step, colours, at, apart = args
         row, quads = ir.VectorType(_INT32, SIDE), []
-        for block in range(SIDE):
-            place = builder.add(at, ir.Constant(at.type, SIXTEEN * block))
-            quads.append(builder.load(_address(context, builder, sig.args[3], colours, place, row), align=4))
+        for _ in range(SIDE):
+            quads.append(builder.load(_address(context, builder, sig.args[3], colours, at, row), align=4))
+            at = builder.add(at, apart)
         wide = builder.bitcast(_joined(builder, quads), ir.VectorType(_BYTE, 4 * SIXTEEN))
         three = [4 * pixel + colour for pixel in range(SIXTEEN) for colour in range(3)]
         _put_bytes(context, builder, sig.args[0], picture, start, step, wide, three, range(4 * SIXTEEN))
         return context.get_dummy_value()
 
-    return types.void(picture, types.uint64, types.uint64, colours, types.uint64), lower
+    return types.void(picture, types.uint64, types.uint64, colours, types.uint64, types.uint64), lower
