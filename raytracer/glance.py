@@ -22,6 +22,7 @@ import numpy as np
 
 from raytracer.arrays import Glance
 from raytracer.camera import SAMPLINGS, Raster, focal_length, is_right
+from raytracer.scene import Vector
 
 _U = 2.0**-24
 _LARGEST = 1 << 22  # pixels across: below, each has a number in single precision
@@ -35,6 +36,11 @@ def make_glance(raster: Raster, spread: float) -> Glance:
     middle_x, middle_y = (raster.width - shift) / 2, (raster.whole_height - shift) / 2 - raster.first_row
     size = raster.width + raster.height + abs(middle_x) + abs(middle_y)
     usable = bool(is_right(camera) and spread > 0.0 and focus < _LARGEST and size < _LARGEST)
-    u, v, w = (tuple(np.float32(x) for x in axis) for axis in (camera.u, camera.v, camera.w))
     numbers = focus, middle_x, middle_y, 32.0 * _U * focus, 16.0 * _U * size, raster.width, raster.height
-    return Glance(usable, u, v, w, *map(np.float32, numbers))
+    axes = _single(camera.u), _single(camera.v), _single(camera.w)
+    return Glance(usable, *axes, *map(np.float32, numbers))
+
+
+def _single(axis: Vector) -> tuple[np.float32, np.float32, np.float32]:
+    x, y, z = map(np.float32, axis)
+    return x, y, z

@@ -152,7 +152,7 @@ def _paint(plan: Plan, screen: Screen, picture: np.ndarray, watch: Watch) -> Non
         easel.paint(tiles[rows.start], worker)
         return rows
 
-    share_pieces(bands, watch, len(screen.desks), paint)
+    share_pieces(bands, watch, screen.workers(plan.shading), paint)
     easel.finish(*range(len(screen.desks)))
 
 

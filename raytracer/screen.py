@@ -75,6 +75,7 @@ _FEW = 1 << 15  # spheres below which one thread sorts them sooner than two
 _MOST_WORKERS = 8  # that sort: each counts all tiles anew
 _BAND_PIXELS = 1 << 18  # of a numpy stage's block
 _PIXELS_A_MOMENT, _SPHERES_A_MOMENT = 1 << 22, 1 << 15  # what is drawn in two milliseconds or so
+_WORTH_A_THREAD = 8  # a moment
 _STACK = 8 * 24  # boxes that may wait, eight a level
 _KEPT = 1 << 26  # bytes of a workspace that is kept
 
@@ -153,13 +154,21 @@ class Screen(NamedTuple):
         Some for each core, so that all are done at one time, but where `joint`: all are at work on the same piece.
         """
         height = self.kernels.TILE_HEIGHT
-        rows, pixels = -(-self.raster.height // height), self.raster.height * self.raster.width
-        moments = (1 + len(self.slow.ids) + shading / 8) * pixels / _PIXELS_A_MOMENT
-        moments += len(self.bins.entries) / _SPHERES_A_MOMENT
-        step = rows // max(1 if joint else 4 * cores(), int(moments))
+        rows = -(-self.raster.height // height)
+        step = rows // max(1 if joint else 4 * cores(), int(self._moments(shading)))
         step = max(1, step if joint else min(step, _BAND_PIXELS // (height * self.raster.width)))
         cuts = [row * height for row in range(0, rows, step)]
         return [slice(a, b) for a, b in zip(cuts, [*cuts[1:], self.raster.height], strict=True)]
+
+    def workers(self, shading: float = 0.0) -> int:
+        """How many threads are to paint: to wake another takes longer than to do very little."""
+        return min(len(self.desks), 1 + int(_WORTH_A_THREAD * self._moments(shading)))
+
+    def _moments(self, shading: float) -> float:
+        """How long the picture will take, about, for two cores."""
+        pixels = self.raster.height * self.raster.width
+        moments = (1 + len(self.slow.ids) + shading / 8) * pixels / _PIXELS_A_MOMENT
+        return moments + len(self.bins.entries) / _SPHERES_A_MOMENT
 
     def tiles_of(self, rows: slice, columns: slice = slice(None)) -> Tiles:
         """The tiles of some rows, which are cut between tiles; or those of the first row of tiles in some columns."""
@@ -496,40 +505,37 @@ def _sort(
     cuts = [spheres * worker // workers // 8 * 8 for worker in range(workers)] + [spheres]
     counts = workspace.zeros((workers + 1) * columns * rows, np.int64, "counts").reshape(workers + 1, -1)
     starts = workspace.array(columns * rows + 1, np.int64, "starts")
-    records: list[Records] = [_NO_RECORDS] * (workers + 1)
-    ends, slow = [0] * (workers + 1), [_NO_IDS] * workers
-
-    def count(part: int, find: Callable[[Records], int], guess: int) -> None:
-        """Find a part's records, anew if there was no room for all of them."""
-        room = _records(workspace, part, guess)
-        end = find(room)
-        if end + kernels.SIXTEEN > len(room.tiles):
-            room = _records(workspace, part, end + kernels.SIXTEEN)
-            find(room)
-        records[part], ends[part] = room, end
-        kernels.count(room, end, counts[part])
+    parts = [_NO_PART] * (workers + 1)
 
     def bound(part: int, worker: int) -> None:
         first, last = cuts[part], cuts[part + 1]
-        ids = workspace.array(last - first, np.int32, "slow", part)
+        slow = workspace.array(last - first, np.int32, "slow", part)
         boxes = workspace.array(64, np.int32, "boxes", part)
 
-        def find(room: Records) -> int:
-            end, slows = kernels.bound(
-                glance, lens, view.eye, view.reach, view.kappa, view.balls, first, last, columns, room, ids, boxes
+        def find(room: Records) -> tuple[int, int]:
+            found: tuple[int, int] = kernels.bound(
+                glance, lens, view.eye, view.reach, view.kappa, view.balls, first, last, columns, room, slow, boxes
             )
-            slow[part] = ids[:slows].copy()
-            return int(end)
+            return found
 
-        count(part, find, (last - first) * 9 // 8 + _SPARE_RECORDS)
+        count(part, find, (last - first) * 9 // 8 + _SPARE_RECORDS, slow)
+
+    def count(part: int, find: Callable[[Records], tuple[int, int]], guess: int, slow: np.ndarray = _NO_IDS) -> None:
+        records = _records(workspace, part, guess)
+        end, slows = find(records)
+        if end + kernels.SIXTEEN > len(records.tiles):  # then not all are there
+            records = _records(workspace, part, end + kernels.SIXTEEN)
+            find(records)
+        parts[part] = _Part(records, end, slow[:slows])
+        kernels.count(records, end, counts[part])
 
     def fill(part: int, worker: int) -> None:
-        kernels.fill(records[part], ends[part], counts[part], entries)
+        kernels.fill(parts[part].records, parts[part].end, counts[part], entries)
 
     share(list(range(workers)), bound, threads)
     if len(facet_boxes):
         boxes, first = facet_boxes.reshape(-1), view.first_facet
-        count(workers, lambda room: int(kernels.record_boxes(boxes, first, columns, room)), 2 * len(facet_boxes))
+        count(workers, lambda room: (kernels.record_boxes(boxes, first, columns, room), 0), 2 * len(facet_boxes))
     kernels.begin(counts, starts)
     middles = workspace.array(columns * rows, np.int64, "middles")
     middles[:] = counts[workers]
@@ -538,7 +544,18 @@ def _sort(
     share(list(range(workers)), fill, threads)
     if len(facet_boxes):
         fill(workers, 0)
-    return Bins(starts, entries, middles, columns), np.concatenate(slow)
+    return Bins(starts, entries, middles, columns), np.concatenate([part.slow for part in parts])
+
+
+class _Part(NamedTuple):
+    """What a thread has found of its part of the shapes."""
+
+    records: Records
+    end: int  # how many there are of them
+    slow: np.ndarray  # int32, which spheres are slow
+
+
+_NO_PART = _Part(_NO_RECORDS, 0, _NO_IDS)
 
 
 def _records(workspace: Workspace, part: int, size: int) -> Records:
