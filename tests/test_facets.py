@@ -17,7 +17,7 @@ from raytracer.facets import measure, see_facets, vectors_of, zero_side
 from raytracer.interpreter import interpret
 from raytracer.lookup import light_cells, tree_of
 from raytracer.scene import Camera, Scene, Triangles, vector
-from raytracer.screen import Screen, open_screen
+from raytracer.screen import open_screen
 
 both_paths = pytest.mark.skipif(backend.why_no_compiler() != "", reason="numba is not installed")
 
@@ -62,14 +62,7 @@ def test_the_kernel_finds_the_bits_that_numpy_finds(kind, camera, seed):
         np.testing.assert_array_equal(table[:, 12], seen.distance)
         np.testing.assert_array_equal(table[:, 13:16].T, zeros)
         np.testing.assert_array_equal(screen.view.balls.reshape(-1, 4), seen.planes)
-        np.testing.assert_array_equal(boxes_of(screen), boxes)
-
-
-def boxes_of(screen: Screen) -> np.ndarray:
-    """The box of each sphere, then of each triangle."""
-    boxes = screen.bins.boxes.reshape(-1, 4).copy()
-    boxes[screen.slow.ids] = screen.slow.boxes
-    return np.concatenate([boxes[: screen.spheres], boxes[len(screen.targets.balls) :]])
+        np.testing.assert_array_equal(screen.facet_boxes, boxes)
 
 
 def camera_axes(camera: Camera) -> tuple[tuple[float, float, float], ...]:
