@@ -107,10 +107,10 @@ def make_quick(
     camera, shift = raster.camera, SAMPLINGS[raster.sampling]
     focus = focal_length(camera.fov) * raster.whole_height / 2
     across, up = (np.abs(ends).max() / focal_length(camera.fov) for ends in raster.ends())
-    rows, weight, farthest = [], 0.0, 0.0
+    rows, weight, farthest, darkest = [], 0.0, 0.0, 0.0
     for light in lights:
         away = light_from_eye(light, camera, unit).tolist()
-        strength = max(map(abs, light.colour))
+        strength, darkest = max(map(abs, light.colour)), min(darkest, *light.colour)
         weight, farthest = weight + strength, max(farthest, hypot(*away))
         place = (inner(*axis, *away) for axis in (camera.u, camera.v, camera.w))
         rows.append([*place, *light.colour, strength, 0.0])
@@ -118,7 +118,8 @@ def make_quick(
     steep = 0.5 * (1.0 + widest) ** 2 / (_LEAST * (widest - 1.0 + _LEAST))
     usable = bool(
         is_right(camera) and steep < _STEEPEST and 1.0 < focus < _LONGEST
-        and farthest < _FARTHEST and weight < _BRIGHTEST and diffuse[0] >= 0.0 and diffuse[1] < _BRIGHTEST
+        and farthest < _FARTHEST and weight < _BRIGHTEST and min(darkest, diffuse[0]) >= 0.0
+        and diffuse[1] < _BRIGHTEST
     )  # fmt: skip
     return Quick(
         usable, camera.u, camera.v, camera.w, focus,

@@ -191,6 +191,7 @@ for _symbol, _lower in (
     (operator.mul, ir.IRBuilder.mul),
     (operator.and_, ir.IRBuilder.and_),
     (operator.or_, ir.IRBuilder.or_),
+    (operator.xor, ir.IRBuilder.xor),
     (operator.lshift, ir.IRBuilder.shl),
     (operator.rshift, ir.IRBuilder.lshr),
 ):

@@ -30,6 +30,8 @@ from raytracer.kernels.lanes import (
     gather_rows,
     load,
     load_low,
+    mask_of,
+    smallest_of,
     spread,
     store,
     store_pair,
@@ -62,6 +64,7 @@ from raytracer.kernels.surfaces import diffuse_at, meet_spheres
 from raytracer.kernels.visibility import AHEAD, corners_of, fetch, from_eye, holding, sphere_of
 from raytracer.quick import ONE_BYTE, coarseness_of, error_of, flatness_of, near_of
 from raytracer.shading import to_byte
+from raytracer.twofold import select
 
 MOST = 1 << 12  # spheres of a tile's list; of more, the table would leave the core's caches
 FEW_LATE = 256  # pixels to be shaded in float64: enough for a while
@@ -71,10 +74,9 @@ _LIGHT = np.uint64(8)  # numbers a light
 _ONE, _SIXTEEN = np.uint64(1), np.uint64(SIXTEEN)
 _HALF, _UNIT, _ZERO, _STEP = np.float32(0.5), np.float32(1.0), np.float32(0.0), np.float32(SIDE)
 _DARKEST, _BRIGHTEST = np.float32(0.5 * ONE_BYTE), np.float32(255.5 * ONE_BYTE)
-_MASK = np.int32(ONE_BYTE - 1)
+_PARTS = int(ONE_BYTE).bit_length() - 1
 _HOPELESS = np.float32(2.0**-8)  # an error of which no byte is certain
-_SPARE = np.float32(4.0)  # parts of a byte: what roundings at the end add
-_NEAR, _COARSE = np.uint64(120), np.uint64(128)  # where of the batch these are
+_SPARE = np.float32(5.0)  # parts of a byte: what roundings at the end add
 _SMALLEST, _LARGEST = 1e-10, 1e10  # depths that single precision can square
 
 
@@ -102,26 +104,33 @@ def _draw_all(view, bins, first, end, tile, paints, sheet):
         store(sheet.number, p, sixteen(0))
     store(sheet.table, 0, spread(_ZERO))
     align_stack()
-    tie, coarsest, s, batch = _ZERO, _ZERO, _longest(paints.quick, tile) / paints.quick.focus, sheet.batch
+    tie, coarsest, s = _ZERO, spread(0.0), _longest(paints.quick, tile) / paints.quick.focus
     for at in range(first, end, WIDTH):
         count, row = min(WIDTH, end - at), np.uint64(at - first)
-        unfit = look(view, bins, np.uint64(at), row, tile, s, paints, sheet)
+        unfit, near, coarse = look(view, bins, np.uint64(at), row, tile, s, paints, sheet)
         if bits_of(unfit) & ((1 << count) - 1):
             return np.float32(-1.0)
+        listed = mask_of((1 << count) - 1)
+        tie = max(tie, np.float32(_largest(select(listed, near, 0.0))))
+        coarsest = select(listed & (coarse > coarsest), coarse, coarsest)
         for j in range(np.uint64(0), np.uint64(count)):
             place = np.uint64(at) + j
             fetch(view, sphere_of(bins.entries[place + np.uint64(AHEAD)]))
-            tie, coarsest = max(tie, batch[_NEAR + j]), max(coarsest, batch[_COARSE + j])
             draw(bins.entries[place], np.int32(row + j + _ONE), j, tie, sheet)
-    return coarsest
+    return np.float32(_largest(coarsest))
+
+
+@inlined
+def _largest(lanes):
+    return -smallest_of(-lanes)
 
 
 def _look(view, bins, at, row, tile, s, paints, sheet):
     """Work out what is drawn and shaded of the next eight spheres of a list.
 
-    Returns for which of them single precision is not.
+    Returns for which of them single precision is not, how much k may be off, and how coarse they are.
     """
-    quick, batch, where = paints.quick, sheet.batch, load_low(bins.entries, at)
+    quick, batch, where, coarse = paints.quick, sheet.batch, load_low(bins.entries, at), spread(0.0)
     x, y, z, radius = gather_rows(view.balls, where)
     x, y, z = x - view.eye[0], y - view.eye[1], z - view.eye[2]
     depth, pixel = -inner(quick.w[0], quick.w[1], quick.w[2], x, y, z), 1.0 / quick.focus
@@ -151,17 +160,15 @@ def _look(view, bins, at, row, tile, s, paints, sheet):
     store_halves(batch, 96, depth * v * -pixel)
     store_halves(batch, 104, radius)
     store_halves(batch, 112, 4.0 * error * m)
-    store_halves(batch, _NEAR, near_of(rho, error))
     if shades:
         away, scale = abs(middle_x) + abs(middle_y), (255.0 * ONE_BYTE) * blur
         coarse = coarseness_of(away, blur, s, quick.focus, quick.widest)
-        store_halves(batch, _COARSE, coarse)
         red, green, blue, _ = gather_rows(paints.colours, gather(view.material, where))
         store_table(
             sheet.table, row + _ONE, middle_x, middle_y, rho * quick.focus, depth * pixel, red * scale, green * scale,
             blue * scale, coarse,
         )  # fmt: skip
-    return unfit
+    return unfit, near_of(rho, error), coarse
 
 
 def _draw(entry, number, j, tie, sheet):
@@ -309,9 +316,8 @@ def _shade(tile, limits, quick, sheet, out):
         colour, hit = red >> 16 | (green >> 8 & 0xFF00) | (blue & 0xFF0000), load_two(sheet.number, p, q) > 0
         store_pair(sheet.colour, p, q, blend(hit, colour, quick.background))
         if certain:
-            bits = bits_of(
-                hit & (none | _is_close(red, error[0]) | _is_close(green, error[1]) | _is_close(blue, error[2]))
-            )
+            apart = _apart(red, error[0]) | _apart(green, error[1]) | _apart(blue, error[2])
+            bits = bits_of(hit & (none | ((apart >> _PARTS) > 0)))
             close = _list(sheet, close, p, bits & 0xFFFF)
             close = _list(sheet, close, q, bits >> 16)
     return close
@@ -405,15 +411,14 @@ def _light(quick, sheet, x, y, u, v, limits):
 @inlined
 def _parts(light, colour):
     """A channel in parts of a byte, from half a byte on."""
-    channel = times_plus(light, colour, _DARKEST)
-    return whole_numbers(lesser(greater(channel, _DARKEST), _BRIGHTEST))
+    return whole_numbers(lesser(times_plus(light, colour, _DARKEST), _BRIGHTEST))
 
 
 @inlined
-def _is_close(channel, error):
-    """Where a channel is so close to the border of two bytes that its error may reach beyond."""
+def _apart(channel, error):
+    """The upper bits are not 0 where a channel may be of one byte or of another."""
     error = whole_numbers(error)
-    return (channel + error & _MASK) <= error + error
+    return channel + error ^ channel - error
 
 
 @borrowing
