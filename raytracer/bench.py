@@ -1,7 +1,8 @@
 """The figures of the performance table, on the machine at hand: pictures, rays and files, and what peers take for them.
 
-Competitors take turns: after a first call each, which is noted apart, every round calls each of them once, so that
-whatever else the machine does meets all of them. A figure is the median of the rounds; quartiles stand beside it. A
+Competitors take turns: after a first call each, which is noted apart, every round calls each of them, so that whatever
+else the machine does meets all of them; what is done in a moment is called a few times in a row, as in a film, and the
+median noted. A figure is the median of the rounds; quartiles stand beside it. A
 competitor that has used its share of time sits out the further rounds, and one whose first call took several shares is
 judged by that call. A picture is the whole public call, `render_scene`, into an array that is there already, of a
 camera that has moved since the call before.
@@ -13,9 +14,10 @@ import os
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
+from itertools import cycle
 from math import radians, tan
 from pathlib import Path
-from statistics import quantiles
+from statistics import median, quantiles
 from tempfile import TemporaryDirectory
 from time import sleep
 from typing import NamedTuple
@@ -40,6 +42,7 @@ _MATERIALS = 64
 _STEP = 0.01  # of the camera between two pictures
 _DECIMALS = 6
 _REST = 0.01  # seconds before a call, in which threads of the one before may go to sleep
+_CALLS, _MOMENT = 7, 0.05  # in a row, at most; seconds after which there is no further one
 _SHARES = 4  # of time, of a first call, after which there is no second
 
 Progress = Callable[[str], object]
@@ -88,8 +91,8 @@ class Timing(NamedTuple):
         """The first, the median, the third."""
         if len(self.rounds) == 1:
             return self.rounds * 3
-        low, median, high = quantiles(self.rounds, n=4, method="inclusive")
-        return low, median, high
+        low, middle, high = quantiles(self.rounds, n=4, method="inclusive")
+        return low, middle, high
 
     @property
     def median(self) -> float:
@@ -222,11 +225,15 @@ def calling(work: Callable[[], object]) -> Lane:
 
 def drawing(draw: peers.Draw, scene: Scene, size: Size) -> Lane:
     """The lane of a picture; if what is drawn is smaller than the size, its time is scaled up."""
-    views = cameras(scene)
+    views = cycle(cameras(scene))
 
     def lane(turn: int) -> tuple[float, float]:
-        seconds, picture = clocked(partial(draw, views[turn % len(views)]))
-        return seconds, seconds * pixels(size) / (picture.size // 3)
+        times, part = list[float](), 1.0
+        while not times or (turn > 0 and len(times) < _CALLS and sum(times) < _MOMENT):
+            seconds, picture = clocked(partial(draw, next(views)))
+            times.append(seconds)
+            part = picture.size // 3 / pixels(size)
+        return sum(times), median(times) / part
 
     return lane
 
