@@ -47,6 +47,7 @@ def is_right(camera: Camera) -> bool:
     return all(abs(inner(*a, *b) - float(a is b)) <= _CROOKED for a in axes for b in axes)
 
 
+@lru_cache(maxsize=64)
 def focal_length(fov: float) -> float:
     """The float64 nearest to 1 / tan(fov / 2), fov in degrees, 0 < fov < 180; +inf where that is beyond float64."""
     with localcontext() as context:

@@ -15,13 +15,14 @@ import numpy as np
 from raytracer import backend
 from raytracer.arrays import FullPaints, Hits, Paints, Tiles
 from raytracer.eye import Eye, count_tests
-from raytracer.image import Depth, to_bytes
+from raytracer.image import Depth
 from raytracer.methods import CERTIFIED, Method
 from raytracer.notebook import Picture
 from raytracer.plan import Plan, make_plan
 from raytracer.pool import share
 from raytracer.scene import Camera, Light, Materials, Scene, Spheres
 from raytracer.screen import ALL, SPARE, Pixels, Screen, make_canvas, make_full_paints, make_paints, open_screen
+from raytracer.shading import to_byte
 from raytracer.stages import Block, Whole
 
 _GREY = Materials(np.full((1, 11), 0.5))
@@ -191,7 +192,7 @@ class Easel:
             some = hits.index >= 0
             pixels = doubtful._replace(xs=doubtful.xs[some], ys=doubtful.ys[some])
             colours = self.screen.colours(kernel, pixels, Hits(hits.t[some], hits.index[some]), self.paints, worker)
-            self.picture[places[0][some], places[1][some]] = to_bytes(colours)
+            self.picture[places[0][some], places[1][some]] = to_byte(colours)
             return
         block = Block(plan.scene, plan.raster, doubtful.ys, found, plan.lights, doubtful.xs)
         self.picture[places] = colours_of(plan, block)
