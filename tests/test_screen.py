@@ -111,51 +111,79 @@ def test_rows_of_out_may_lie_apart():
     assert (room[:, 36:] == 9).all()
 
 
-def records_of(scene, raster, usable):
-    """For each sphere, the pixels of the boxes that are recorded of it; and which spheres are slow."""
+def boxes_of(scene, raster, usable):
+    """The box of each sphere, (n, 4), put together from its records, empty without; and which spheres are slow."""
     with open_screen(scene, raster, KERNELS) as opened:
-        view, columns = opened.view, opened.bins.columns
-        glance = make_glance(raster, view.kappa)
+        view, columns, count = opened.view, opened.bins.columns, len(scene.spheres)
+        glance, (slow, spare) = make_glance(raster, view.kappa), np.empty((2, count + 64), np.int32)
         assert glance.usable
-        room = Records(*(np.empty(100 * len(scene) + 16, np.int32) for _ in range(3)))
-        slow, boxes = np.empty(len(scene), np.int32), np.empty(64, np.int32)
-        end, slows = KERNELS.bound(
-            glance._replace(usable=usable), make_lens(raster), view.eye, view.reach, view.kappa, view.balls, 0,
-            len(scene), columns, room, slow, boxes,
-        )  # fmt: skip
-        short = room._replace(tiles=room.tiles[:7])
-        assert KERNELS.bound(
-            glance._replace(usable=usable), make_lens(raster), view.eye, view.reach, view.kappa, view.balls, 0,
-            len(scene), columns, short, slow, boxes,
-        ) == (end, slows)  # fmt: skip
-    pixels = {}
-    for tile, corners, shape in zip(*(array[:end].tolist() for array in room), strict=True):
-        x, y = tile % columns * KERNELS.TILE_WIDTH, tile // columns * KERNELS.TILE_HEIGHT
-        left, right, top, bottom = (corners >> 8 * i & 255 for i in range(4))
-        assert left < right <= KERNELS.TILE_WIDTH
-        assert top < bottom <= KERNELS.TILE_HEIGHT
-        box = {(column, row) for column in range(x + left, x + right) for row in range(y + top, y + bottom)}
-        assert not box & pixels.get(shape, set())
-        pixels.setdefault(shape, set()).update(box)
-    return pixels, set(slow[:slows].tolist())
+
+        def bound(size):
+            room = Records(*(np.full(size, -1, np.int32) for _ in range(3)))
+            found = KERNELS.bound(
+                glance._replace(usable=usable), make_lens(raster), view.eye, view.reach, view.kappa, view.balls, 0,
+                count, columns, room, slow, spare,
+            )  # fmt: skip
+            return room, found
+
+        _, found = bound(7)  # too few: how many there would be
+        room, found_again = bound(found[0] + KERNELS.SIXTEEN)
+        assert found_again == found
+    tiles, corners, shapes = (array[: found[0]] for array in room)
+    x, y = tiles % columns * KERNELS.TILE_WIDTH, tiles // columns * KERNELS.TILE_HEIGHT
+    left, right, top, bottom = (corners >> 8 * i & 255 for i in range(4))
+    assert (left < right).all()
+    assert (top < bottom).all()
+    assert right.max() <= KERNELS.TILE_WIDTH
+    assert bottom.max() <= KERNELS.TILE_HEIGHT
+    boxes, area = np.tile(np.array([1 << 20, 0, 1 << 20, 0]), (count, 1)), np.zeros(count, np.int64)
+    for side, (keep, ends) in enumerate(
+        ((np.minimum, x + left), (np.maximum, x + right), (np.minimum, y + top), (np.maximum, y + bottom))
+    ):
+        keep.at(boxes[:, side], shapes, ends)
+    np.add.at(area, shapes, (right - left) * (bottom - top))
+    boxes[area == 0] = 0
+    np.testing.assert_array_equal((boxes[:, 1] - boxes[:, 0]) * (boxes[:, 3] - boxes[:, 2]), area)
+    return boxes, slow[: found[1]].tolist()
 
 
 @pytest.mark.parametrize(
-    "camera", [Camera(), turned(Camera(eye=(1.0, 2.0, 3.0), fov=100.0), (0.0, 0.0, -5.0), 0.3, -0.2)], ids=str
+    ("camera", "more"),
+    [
+        (Camera(), 0.01),
+        (turned(Camera(eye=(1.0, 2.0, 3.0), fov=100.0), (0.0, 0.0, -5.0), 0.3, -0.2), 0.01),
+        (Camera(fov=0.5), 0.3),
+    ],
+    ids=str,
 )
-def test_boxes_at_a_glance_hold_those_of_float64_and_little_more(camera):
-    rng, count = np.random.default_rng(4), 3000
-    centres = np.array(camera.eye) + rng.normal(size=(count, 3)) * 10.0 ** rng.uniform(-1, 2, (count, 1))
-    radii = 10.0 ** rng.uniform(-3.5, 0.5, count)
+def test_boxes_at_a_glance_hold_those_of_float64_and_little_more(camera, more):
+    rng, count = np.random.default_rng(4), 200_000
+    ahead = -np.array(camera.w) * rng.uniform(-2, 100, (count, 1))
+    beside = rng.normal(size=(count, 2)) @ [camera.u, camera.v] * np.abs(ahead).max(1, keepdims=True)
+    centres, radii = (
+        np.array(camera.eye) + ahead + beside * rng.uniform(0, 1, (count, 1)),
+        10.0 ** rng.uniform(-4, 0, count),
+    )
+    radii = np.where(rng.random(count) < 0.01, 30 * radii, radii)
     spheres = Spheres(radii, centres, np.zeros(count, np.int32), np.arange(count, dtype=np.int32))
-    raster = make_raster(camera, 300, 170, rows=slice(32, 150))
+    raster = make_raster(camera, 1500, 900, rows=slice(32, 850))
     scene = Scene(camera, materials=Materials(np.full((1, 11), 0.5)), spheres=spheres)
-    (found, slow), (expected, slow_too) = (records_of(scene, raster, usable) for usable in (True, False))
+    (found, slow), (expected, slow_too) = (boxes_of(scene, raster, usable) for usable in (True, False))
     assert slow == slow_too
-    assert len(expected) > 100
-    assert all(box <= found.get(shape, set()) for shape, box in expected.items())
-    extra = sum(map(len, found.values())) - sum(map(len, expected.values()))
-    assert 0 <= extra < 0.01 * sum(map(len, expected.values()))
+    shown = expected[:, 1] > 0
+    assert shown.sum() > 1000
+    assert (found[shown] * [1, -1, 1, -1] <= expected[shown] * [1, -1, 1, -1]).all()
+    assert 0.0 < np.abs(found - expected)[shown].mean() < more
+    assert np.count_nonzero(found[~shown, 1]) < 10 * more * shown.sum()
+
+
+@pytest.mark.parametrize("count", [10, 37, 64])
+def test_lists_longer_than_expected_are_made_all_the_same(monkeypatch, count):
+    scene = spread(count, seed=2)
+    expected = drawn(scene, "hit", 700, 400, KERNELS)
+    monkeypatch.setattr(screen, "_idle", LifoQueue(1))
+    monkeypatch.setattr(screen, "_SPARE_RECORDS", 0)
+    np.testing.assert_array_equal(drawn(scene, "hit", 700, 400, KERNELS), expected)
 
 
 def test_memory_is_forty_bytes_a_sphere_at_most(monkeypatch):
