@@ -298,10 +298,10 @@ class Scratch(NamedTuple):
     k: np.ndarray  # float64 (rows · STRIDE,)
     index: np.ndarray  # type: ignore[assignment]  # int32
     doubt: np.ndarray  # bool
-    batch: np.ndarray  # float64 (40,)
+    batch: np.ndarray  # float64 (64,)
     stack: np.ndarray  # int64 (STACK,), boxes of a tree
     near: np.ndarray  # float64 (STACK,), where rays enter them
-    rest: np.ndarray  # uint8 (24,)
+    rest: np.ndarray  # uint8 (32,)
     quick: QuickScratch
 
 

@@ -6,7 +6,7 @@ V = y / z, ρ = r / z, the ellipse that the sphere covers reaches (see `boxes`, 
     from  (U − ρ √(U² + 1 − ρ²)) / (1 − ρ²)  to  (U + ρ √(U² + 1 − ρ²)) / (1 − ρ²),
 
 and likewise for V; in pixels that is times f, the focal length, from the picture's middle on. For ρ ≤ ¼, with u = 2⁻²⁴:
-x, y, z are off by 4u|(x, y, z)|, so U and V by 4u(m + |U| m + |U|) where m² = 1 + U² + V², and what is made of them in
+x, y, z are off by 5u|(x, y, z)|, so U and V by 5u(m + |U| m + |U|) where m² = 1 + U² + V², and what is made of them in
 pixels by less than 20 f m²u, and 4u of the pixels that have a place on the screen: see `Glance.pad` and `slack`. The
 half width is off by a few times 2⁻¹⁴ of itself where the roots are rough, and so is 1 / (1 − ρ²) by ρ² times that.
 

@@ -2,8 +2,8 @@
 
 Eye rays share their origin, so a sphere covers an ellipse on the screen, and only pixels in its box can hit it:
 
-    bound       the box of each sphere, eight at a time, and how many reach into each tile of the screen
-    begin, fill the list of each tile
+    bound       the box of each sphere, sixteen at a time, and a record for each tile that it reaches into
+    count, begin, fill  the list of each tile
     paint       a tile at a time: a small depth buffer, then colours, while all of it is in the core's first cache
 
 No tree, no ray objects, nothing normalised, and only one square root for a pixel and a sphere. A tile with nothing but

@@ -318,12 +318,7 @@ def candidates(slow, bins, xs, ys):
 @borrowing
 def _merge(slow, bins, x, y, ids, at):
     """Write a pixel's candidates, ascending, to `ids` from `at` on, if it has room; returns how many there are."""
-    tile, found = y // TILE_HEIGHT * bins.columns + x // TILE_WIDTH, 0
-    for i in range(len(slow.ids)):
-        box = slow.boxes[i]
-        if box[0] <= x and x < box[1] and box[2] <= y and y < box[3]:
-            _put_in_order(ids, at, found, slow.ids[i])
-            found += 1
+    tile, found, slows = y // TILE_HEIGHT * bins.columns + x // TILE_WIDTH, 0, 0
     for some in range(bins.starts[tile], bins.starts[tile + 1], WIDTH):
         bits = holding(bins.entries, some, bins.starts[tile + 1], x % TILE_WIDTH, y % TILE_HEIGHT)
         while bits:
@@ -331,12 +326,34 @@ def _merge(slow, bins, x, y, ids, at):
             bits &= bits - 1
             _put_in_order(ids, at, found, np.int32(sphere_of(bins.entries[place])))
             found += 1
-    return found
+    for i in range(len(slow.ids)):
+        slows += _is_within(slow.boxes[i], x, y)
+    if len(ids) and slows:
+        _merge_slow(slow, x, y, ids, at, at + found, slows)
+    return found + slows
+
+
+@inlined
+def _merge_slow(slow, x, y, ids, at, end, slows):
+    """Put so many slow spheres of a pixel among the others, which ascend in `ids` from `at` to `end`."""
+    place, free = end - 1, end + slows - 1
+    for i in range(len(slow.ids) - 1, -1, -1):
+        if _is_within(slow.boxes[i], x, y):
+            while place >= at and ids[place] > slow.ids[i]:
+                ids[free] = ids[place]
+                place, free = place - 1, free - 1
+            ids[free] = slow.ids[i]
+            free -= 1
+
+
+@inlined
+def _is_within(box, x, y):
+    return box[0] <= x and x < box[1] and box[2] <= y and y < box[3]
 
 
 @inlined
 def _put_in_order(ids, at, found, number):
-    """Put a number among the `found` ascending ones in `ids` from `at` on, if that has room."""
+    """Put a number among the `found` ascending ones in `ids` from `at` on, if that has room: mostly it is the last."""
     if len(ids):
         place = at + found
         while place > at and ids[place - 1] > number:
