@@ -227,7 +227,7 @@ def _draw_panel(axes: Axes, section: Section, places: Sequence[float], names: li
             _draw_line(axes, name, own, _colour(name, names))
     axes.axhline(_FLUENT, color=OTHER, linewidth=1, linestyle=(0, (1, 2)), zorder=1)
     axes.text(
-        1, _FLUENT, "60 a second ", transform=axes.get_yaxis_transform(), ha="right", va="bottom", size=8, color=OTHER
+        0, _FLUENT, " 60 a second", transform=axes.get_yaxis_transform(), ha="left", va="top", size=8, color=OTHER
     )
     low, high = min(places), max(places)
     axes.set_xlim(low / 1.3, 1.3 * high * (high / low) ** 0.22)  # room for names
