@@ -309,9 +309,7 @@ class QuickScratch(NamedTuple):
     """What `kernels.quick` writes on while it does a tile, in strips of 4 pixels, row by row of each strip."""
 
     depth: np.ndarray  # float32 (pixels,), k of the nearest hit so far
-    colour: (
-        np.ndarray
-    )  # int32 (pixels,), in the same memory, when the depth is of no use any more: red in the lowest byte
+    colour: np.ndarray  # int32 (pixels,), red in the lowest byte: in the memory of the depth, once that is done with
     number: np.ndarray  # int32 (pixels,): which of the tile's list that is, counted from 1, 0 for none
     doubt: np.ndarray  # int32 (rows of strips,), a bit a pixel
     table: np.ndarray  # float32, flat: eight numbers for each of the tile's list, for shading; the first row is free

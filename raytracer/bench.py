@@ -2,10 +2,10 @@
 
 Competitors take turns: after a first call each, which is noted apart, every round calls each of them, so that whatever
 else the machine does meets all of them; what is done in a moment is called a few times in a row, as in a film, and the
-median noted. A figure is the median of the rounds; quartiles stand beside it. A
-competitor that has used its share of time sits out the further rounds, and one whose first call took several shares is
-judged by that call. A picture is the whole public call, `render_scene`, into an array that is there already, of a
-camera that has moved since the call before.
+median noted. A figure is the median of the rounds; quartiles stand beside it. A competitor that has used its share of
+time sits out the further rounds, and one whose first call took several shares is judged by that call. A picture is the
+whole public call, `render_scene`, into an array that is there already, of a camera that has moved since the call
+before.
 """
 
 from __future__ import annotations

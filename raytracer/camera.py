@@ -40,11 +40,17 @@ _PI = Decimal("3.141592653589793238462643383279502884197169399375105820974944592
 _DIGITS = 80
 
 
-@lru_cache(maxsize=64)
 def is_right(camera: Camera) -> bool:
     """Whether u, v, w are of length 1, and at right angles."""
     axes = camera.u, camera.v, camera.w
     return all(abs(inner(*a, *b) - float(a is b)) <= _CROOKED for a in axes for b in axes)
+
+
+def in_pixels(raster: Raster) -> tuple[float, float, float]:
+    """The focal length in pixels, and the column and the row, of those drawn, of the ray (0, 0, −1)."""
+    shift = SAMPLINGS[raster.sampling]
+    focus = focal_length(raster.camera.fov) * raster.whole_height / 2
+    return focus, (raster.width - shift) / 2, (raster.whole_height - shift) / 2 - raster.first_row
 
 
 @lru_cache(maxsize=64)

@@ -21,7 +21,7 @@ from functools import lru_cache
 import numpy as np
 
 from raytracer.arrays import Glance
-from raytracer.camera import SAMPLINGS, Raster, focal_length, is_right
+from raytracer.camera import Raster, in_pixels, is_right
 from raytracer.scene import Vector
 
 _U = 2.0**-24
@@ -31,9 +31,7 @@ _LARGEST = 1 << 22  # pixels across: below, each has a number in single precisio
 @lru_cache(maxsize=8)
 def make_glance(raster: Raster, spread: float) -> Glance:
     """What is to be known of a picture. Not usable for a crooked frame, or where κ is not known (spread 0)."""
-    camera, shift, focus = raster.camera, SAMPLINGS[raster.sampling], focal_length(raster.camera.fov)
-    focus *= raster.whole_height / 2
-    middle_x, middle_y = (raster.width - shift) / 2, (raster.whole_height - shift) / 2 - raster.first_row
+    camera, (focus, middle_x, middle_y) = raster.camera, in_pixels(raster)
     size = raster.width + raster.height + abs(middle_x) + abs(middle_y)
     usable = bool(is_right(camera) and spread > 0.0 and focus < _LARGEST and size < _LARGEST)
     numbers = focus, middle_x, middle_y, 32.0 * _U * focus, 16.0 * _U * size, raster.width, raster.height

@@ -52,7 +52,7 @@ from math import hypot
 import numpy as np
 
 from raytracer.arrays import Quick
-from raytracer.camera import SAMPLINGS, Raster, focal_length, is_right
+from raytracer.camera import Raster, focal_length, in_pixels, is_right
 from raytracer.certified import inner
 from raytracer.scene import Colour, Light
 from raytracer.stages import light_from_eye
@@ -63,7 +63,7 @@ ONE_BYTE = 65536.0  # bytes have so many parts here
 _LONGEST = 2.0**16  # focal length in pixels
 _BEYOND = 0.25  # how far beyond the picture's U and V a sphere's middle may be
 _STEEPEST = 8.0
-_NEAREST, _FARTHEST = 1e-10, 1e10  # lengths whose squares single precision holds
+NEAREST, FARTHEST = 1e-10, 1e10  # lengths whose squares single precision holds
 _BRIGHTEST = 1e4
 _SPARE = 1.1  # for squares of errors
 _ROOT = 2.0**-9  # about √error
@@ -104,8 +104,7 @@ def make_quick(
 
     It is not usable for a frame that is crooked, or where lights and colours are beyond single precision.
     """
-    camera, shift = raster.camera, SAMPLINGS[raster.sampling]
-    focus = focal_length(camera.fov) * raster.whole_height / 2
+    camera, (focus, middle_x, middle_y) = raster.camera, in_pixels(raster)
     across, up = (np.abs(ends).max() / focal_length(camera.fov) for ends in raster.ends())
     rows, weight, farthest, darkest = [], 0.0, 0.0, 0.0
     for light in lights:
@@ -118,12 +117,12 @@ def make_quick(
     steep = 0.5 * (1.0 + widest) ** 2 / (_LEAST * (widest - 1.0 + _LEAST))
     usable = bool(
         is_right(camera) and steep < _STEEPEST and 1.0 < focus < _LONGEST
-        and farthest < _FARTHEST and weight < _BRIGHTEST and min(darkest, diffuse[0]) >= 0.0
+        and farthest < FARTHEST and weight < _BRIGHTEST and min(darkest, diffuse[0]) >= 0.0
         and diffuse[1] < _BRIGHTEST
     )  # fmt: skip
     return Quick(
         usable, camera.u, camera.v, camera.w, focus,
-        (raster.width - shift) / 2, (raster.whole_height - shift) / 2 - raster.first_row, steep, widest,
+        middle_x, middle_y, steep, widest,
         np.array(rows if usable else [], np.float32).reshape(-1),
         weight, 5 * U * farthest, (16 + len(rows)) * U * weight, _packed(background), _packed(flat),
     )  # fmt: skip

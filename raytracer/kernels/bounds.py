@@ -40,13 +40,14 @@ from raytracer.kernels.sixteen import (
     times_plus,
     whole_numbers,
 )
+from raytracer.quick import FARTHEST, NEAREST
 from raytracer.twofold import select
 
 _WIDE, _HIGH = 7, 5
 TILE_WIDTH, TILE_HEIGHT = 1 << _WIDE, 1 << _HIGH  # pixels: a tile's depth buffer fits a core's first cache
 _SLOW = -1.0
 _ALL = (1 << SIXTEEN) - 1
-_NEAREST, _FARTHEST = np.float32(1e-10), np.float32(1e10)  # lengths whose squares single precision holds
+_NEAREST, _FARTHEST = np.float32(NEAREST), np.float32(FARTHEST)
 _WIDEST = np.float32(2.0**20)  # m²
 _ROUGH = np.float32(1.0 + 2.0**-12)
 _ZERO, _UNIT, _FOUR = np.float32(0.0), np.float32(1.0), np.float32(4.0)

@@ -62,7 +62,7 @@ from raytracer.kernels.sixteen import (
 )
 from raytracer.kernels.surfaces import diffuse_at, meet_spheres
 from raytracer.kernels.visibility import AHEAD, corners_of, fetch, from_eye, holding, sphere_of
-from raytracer.quick import ONE_BYTE, coarseness_of, error_of, flatness_of, near_of
+from raytracer.quick import FARTHEST, NEAREST, ONE_BYTE, coarseness_of, error_of, flatness_of, near_of
 from raytracer.shading import to_byte
 from raytracer.twofold import select
 
@@ -77,7 +77,6 @@ _DARKEST, _BRIGHTEST = np.float32(0.5 * ONE_BYTE), np.float32(255.5 * ONE_BYTE)
 _PARTS = int(ONE_BYTE).bit_length() - 1
 _HOPELESS = np.float32(2.0**-8)  # an error of which no byte is certain
 _SPARE = np.float32(5.0)  # parts of a byte: what roundings at the end add
-_SMALLEST, _LARGEST = 1e-10, 1e10  # depths that single precision can square
 
 
 def _paint_tile(view, slow, bins, tile, scratch, doubts, paints, out):
@@ -99,11 +98,11 @@ def _paint_tile(view, slow, bins, tile, scratch, doubts, paints, out):
 
 def _draw_all(view, bins, first, end, tile, paints, sheet):
     """Fill the depth buffer; returns how coarse the coarsest sphere is, −1 if single precision is not for all."""
+    align_stack()
     for p in range(np.uint64(0), _PIXELS, _SIXTEEN):
         store(sheet.depth, p, spread(np.float32(np.inf)))
         store(sheet.number, p, sixteen(0))
     store(sheet.table, 0, spread(_ZERO))
-    align_stack()
     tie, coarsest, s = _ZERO, spread(0.0), _longest(paints.quick, tile) / paints.quick.focus
     for at in range(first, end, WIDTH):
         count, row = min(WIDTH, end - at), np.uint64(at - first)
@@ -141,7 +140,7 @@ def _look(view, bins, at, row, tile, s, paints, sheet):
     rho, blur = radius * over, over_rho * pixel
     u2, v2, rho2, square = u * u, v * v, rho * rho, blur * blur
     m, error = 1.0 + u2 + v2, error_of(quick.steep, rho, blur)
-    unfit = ~((depth > _SMALLEST) & (depth < _LARGEST) & (rho <= 0.25) & (blur < 128.0) & (m < quick.widest))
+    unfit = ~((depth > NEAREST) & (depth < FARTHEST) & (rho <= 0.25) & (blur < 128.0) & (m < quick.widest))
     middle_x = u * quick.focus + (quick.middle_x - (tile.left + _MIDDLE))
     middle_y = (quick.middle_y - (tile.top + _MIDDLE_Y)) - v * quick.focus
     whole_x, whole_y = np.floor(middle_x), np.floor(middle_y)
@@ -511,16 +510,8 @@ _draw_unchecked = variant(_draw_all, "_draw_unchecked", draw=_unchecked_sphere, 
 _shade_certain = variant(_shade, "_shade_certain", inlined, certain=True)
 _shade_unchecked = variant(_shade, "_shade_unchecked", inlined, certain=False)
 _colour_flat = variant(_colour_all, "_colour_flat", colour_tile=_flat)
-_colour_certain = variant(
-    _colour_all,
-    "_colour_certain",
-    colour_tile=_shade_certain,
-)
-_colour_unchecked = variant(
-    _colour_all,
-    "_colour_unchecked",
-    colour_tile=_shade_unchecked,
-)
+_colour_certain = variant(_colour_all, "_colour_certain", colour_tile=_shade_certain)
+_colour_unchecked = variant(_colour_all, "_colour_unchecked", colour_tile=_shade_unchecked)
 flat_quickly = variant(_paint_tile, "flat_quickly", draw_all=_draw_shapes, colour_all=_colour_flat, certain=True)
 diffuse_quickly = variant(
     _paint_tile, "diffuse_quickly", draw_all=_draw_certain, colour_all=_colour_certain,
