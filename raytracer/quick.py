@@ -117,8 +117,8 @@ def make_quick(
     steep = 0.5 * (1.0 + widest) ** 2 / (_LEAST * (widest - 1.0 + _LEAST))
     usable = bool(
         is_right(camera) and steep < _STEEPEST and 1.0 < focus < _LONGEST
-        and farthest < FARTHEST and weight < _BRIGHTEST and min(darkest, diffuse[0]) >= 0.0
-        and diffuse[1] < _BRIGHTEST
+        and farthest < FARTHEST and min(darkest, diffuse[0]) >= 0.0
+        and max(weight, diffuse[1], weight * diffuse[1]) < _BRIGHTEST
     )  # fmt: skip
     return Quick(
         usable, camera.u, camera.v, camera.w, focus,

@@ -245,6 +245,29 @@ def test_choices_marks_and_numbers():
     assert (bits, lowest, some) == (0b1111111111100000, 3, False)
 
 
+def test_rounding_and_packing():
+    @borrowing
+    def run(x, y, out, colours):
+        pair = s.both(k.load(x, 0)) * s.two(np.float32(1.0), np.float32(-3.0))
+        k.store_pair(out, np.uint64(0), np.uint64(16), s.rest(pair))
+        k.store(out, np.uint64(32), s.larger_size(k.load(x, 0), k.load(y, 0)))
+        k.store_pair(colours, np.uint64(0), np.uint64(16), s.rounded(pair))
+        red, green, blue = s.sixteen(np.int32(7)), s.rounded(k.load(y, 0)), s.sixteen(np.int32(40_000))
+        k.store(colours, np.uint64(32), s.pack(red, green, blue))
+
+    x, y = np.linspace(-2.5, 2.5, 16, dtype=np.float32), np.linspace(0.1, 900, 16, dtype=np.float32)
+    x[3] = np.nan
+    out, colours = np.empty(48, np.float32), np.empty(48, np.int32)
+    run(x, y, out, colours)
+    pair = np.concatenate([x, -3 * x])
+    np.testing.assert_array_equal(out[:32], pair - np.rint(pair))
+    np.testing.assert_array_equal(out[32:], np.fmax(abs(x), abs(y)))
+    known = ~np.isnan(pair)
+    np.testing.assert_array_equal(colours[:32][known], np.rint(pair[known]))
+    expected = 7 | np.minimum(np.rint(y), 255).astype(np.int32) << 8 | 255 << 16
+    np.testing.assert_array_equal(colours[32:] & 0xFFFFFF, expected)
+
+
 def test_a_table_of_eight_columns():
     @borrowing
     def run(columns, numbers, table, place, out, spread):

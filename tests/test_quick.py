@@ -58,6 +58,15 @@ def test_the_bytes_are_those_of_float64(seed, stage):
     np.testing.assert_array_equal(drawn(scene, stage, KERNELS), drawn(scene, stage, plain))
 
 
+def test_colours_may_be_far_brighter_than_white():
+    scene = spread(30, seed=4)
+    bright = replace(scene, lights=tuple(replace(light, colour=(9e3, 3.0, 0.5)) for light in scene.lights[:1]))
+    assert quick_of(bright).usable
+    found, expected = (drawn(bright, "diffuse", path) for path in (KERNELS, plain))
+    assert (found[..., 0] == 255).any()
+    np.testing.assert_array_equal(found, expected)
+
+
 @pytest.mark.parametrize("sampling", ["corner", "centre"])
 @pytest.mark.parametrize("size", [(1, 1), (16, 4), (127, 31), (128, 32), (129, 33), (300, 65)], ids=str)
 def test_pictures_end_within_tiles_and_blocks(size, sampling):
@@ -97,6 +106,7 @@ def test_what_single_precision_is_not_for():
         replace(scene, camera=replace(camera, fov=179.0)),
         replace(scene, lights=(replace(light, position=(1e11, 0.0, 0.0)),)),
         replace(scene, lights=(replace(light, colour=(1e5, 0.0, 0.0)),)),
+        replace(scene, lights=(replace(light, colour=(2e3, 0.0, 0.0)),), materials=Materials(np.full((64, 11), 10.0))),
         replace(scene, materials=Materials(np.full((64, 11), -0.5))),
         replace(scene, materials=Materials(np.full((64, 11), 1e5))),
     ):

@@ -1,16 +1,15 @@
 """A tile of small spheres in single precision: sixteen pixels at a time, and float64 for those that are not certain.
 
-    list of the tile ── _look ──> batch   what is drawn of eight spheres      ┌ strips, 4 pixels wide ──┐
-                                  table   what is shaded, a row a sphere      │ 0 1 2 3 │ 128 129 … │   │
-    batch  ── _draw  ──> depth    k of the nearest hit so far                 │ 4 5 6 7 │ 132       │   │
-                         number   which of the list that is                   │ …       │ …         │   │
-                         doubt    where single precision cannot tell          └─────────────────────────┘
+    list of the tile ── _look ──> batch   what is drawn of eight spheres
+                                  table   what is shaded, a row a sphere
+    batch  ── _draw  ──> depth    k of the nearest hit so far
+                         number   which of the list that is
+                         doubt    where single precision cannot tell
     doubt  ── _decide ─> number   in float64
     number ── _shade ──> colour   where the depth was; what is too close to another byte by shade_anew, in float64
-    colour ── _put   ──> bytes of the picture
+    colour ── put_tile > bytes of the picture
 
-So 4 × 4 pixels are sixteen numbers in a row, from whichever row of the tile on. The formulas and the bounds of their
-errors are those of `quick`.
+A tile lies in `strips`. The formulas and the bounds of their errors are those of `quick`.
 """
 
 import numpy as np
@@ -25,7 +24,6 @@ from raytracer.kernels.lanes import (
     any_of,
     bits_of,
     blend,
-    fetch_to_write,
     gather,
     gather_rows,
     load,
@@ -43,14 +41,16 @@ from raytracer.kernels.sixteen import (
     columns_of_block,
     gather_to_columns,
     greater,
-    lesser,
+    larger_size,
     load_columns,
     load_numbers,
     load_two,
     lowest_bit,
-    put_sixteen,
+    pack,
+    rest,
     rough_inverse,
     rough_inverse_root,
+    rounded,
     rows_of_block,
     sixteen,
     spread_rows,
@@ -58,7 +58,16 @@ from raytracer.kernels.sixteen import (
     store_table,
     times_plus,
     two,
-    whole_numbers,
+)
+from raytracer.kernels.strips import (
+    PIXELS,
+    STRIP,
+    fetch_row,
+    is_in,
+    list_block,
+    pixel_of,
+    put_pixel,
+    put_tile,
 )
 from raytracer.kernels.surfaces import diffuse_at, meet_spheres
 from raytracer.kernels.visibility import AHEAD, corners_of, fetch, from_eye, holding, sphere_of
@@ -68,15 +77,11 @@ from raytracer.twofold import select
 
 MOST = 1 << 12  # spheres of a tile's list; of more, the table would leave the core's caches
 FEW_LATE = 256  # pixels to be shaded in float64: enough for a while
-_STRIP = SIDE * TILE_HEIGHT  # pixels of a strip
-_PIXELS, _MIDDLE, _MIDDLE_Y = np.uint64(TILE_WIDTH * TILE_HEIGHT), TILE_WIDTH // 2, TILE_HEIGHT // 2
+_MIDDLE, _MIDDLE_Y = TILE_WIDTH // 2, TILE_HEIGHT // 2
 _LIGHT = np.uint64(8)  # numbers a light
 _ONE, _SIXTEEN = np.uint64(1), np.uint64(SIXTEEN)
 _HALF, _UNIT, _ZERO, _STEP = np.float32(0.5), np.float32(1.0), np.float32(0.0), np.float32(SIDE)
-_DARKEST, _BRIGHTEST = np.float32(0.5 * ONE_BYTE), np.float32(255.5 * ONE_BYTE)
-_PARTS = int(ONE_BYTE).bit_length() - 1
-_HOPELESS = np.float32(2.0**-8)  # an error of which no byte is certain
-_SPARE = np.float32(5.0)  # parts of a byte: what roundings at the end add
+_BORDER = np.float32(0.5 - 5.0 / ONE_BYTE)  # of two bytes, but for what roundings at the end add
 
 
 def _paint_tile(view, slow, bins, tile, scratch, doubts, paints, out):
@@ -99,7 +104,7 @@ def _paint_tile(view, slow, bins, tile, scratch, doubts, paints, out):
 def _draw_all(view, bins, first, end, tile, paints, sheet):
     """Fill the depth buffer; returns how coarse the coarsest sphere is, −1 if single precision is not for all."""
     align_stack()
-    for p in range(np.uint64(0), _PIXELS, _SIXTEEN):
+    for p in range(np.uint64(0), PIXELS, _SIXTEEN):
         store(sheet.depth, p, spread(np.float32(np.inf)))
         store(sheet.number, p, sixteen(0))
     store(sheet.table, 0, spread(_ZERO))
@@ -160,7 +165,7 @@ def _look(view, bins, at, row, tile, s, paints, sheet):
     store_halves(batch, 104, radius)
     store_halves(batch, 112, 4.0 * error * m)
     if shades:
-        away, scale = abs(middle_x) + abs(middle_y), (255.0 * ONE_BYTE) * blur
+        away, scale = abs(middle_x) + abs(middle_y), 255.0 * blur
         coarse = coarseness_of(away, blur, s, quick.focus, quick.widest)
         red, green, blue, _ = gather_rows(paints.colours, gather(view.material, where))
         store_table(
@@ -186,7 +191,7 @@ def _draw(entry, number, j, tie, sheet):
         y = rows + (np.float32(line - _MIDDLE_Y) - b[np.uint64(16) + j])
         of_row, slope = times_plus(y, times_plus(y, -yy, spread(e2)), spread(middle)), times_plus(y, -xy, spread(e1))
         k_row, shift = times_plus(y, spread(k2), spread(k0)), np.float32(SIDE * left - _MIDDLE) - b[j]
-        p = np.uint64(_STRIP * left + SIDE * line)
+        p = np.uint64(STRIP * left + SIDE * line)
         for _ in range(right - left):
             x, best = columns + shift, load(sheet.depth, p)
             disc = times_plus(x, times_plus(x, -xx, slope), of_row)
@@ -200,7 +205,7 @@ def _draw(entry, number, j, tie, sheet):
                 if any_of(unsure):
                     _doubt(sheet, p, bits_of(unsure))
             shift += _STEP
-            p += np.uint64(_STRIP)
+            p += np.uint64(STRIP)
 
 
 @inlined
@@ -231,25 +236,13 @@ def _decide(view, bins, tile, sheet, doubts):
             while bits:
                 p = np.int32(row) * SIDE + lowest_bit(bits)
                 bits &= bits - 1
-                x, y = _pixel(p)
-                if _is_in(tile, x, y):
+                x, y = pixel_of(p)
+                if is_in(tile, x, y):
                     number, unsure = _first_of(view, bins, tile, x, y)
                     sheet.number[p] = number
                     if unsure:
                         doubts[0] += 1
                         doubts[doubts[0]] = (tile.top + y) * width + tile.left + x
-
-
-@inlined
-def _pixel(p):
-    """Column and row of pixel p of the strips."""
-    return p // _STRIP * SIDE + p % SIDE, p // SIDE % TILE_HEIGHT
-
-
-@inlined
-def _is_in(tile, x, y):
-    """Whether the picture has that pixel of the tile."""
-    return tile.left + x < tile.right and tile.top + y < tile.bottom
 
 
 @borrowing
@@ -278,7 +271,7 @@ def _colour_all(view, bins, tile, coarsest, paints, sheet, out):
     """Colours, and then bytes."""
     align_stack()
     count = colour_tile(tile, _limits(paints.quick, tile, coarsest), paints.quick, sheet, out)
-    _put(tile, sheet, out)
+    put_tile(tile, sheet, out)
     _keep_for_later(bins, tile, count, sheet)
 
 
@@ -286,7 +279,7 @@ def _colour_all(view, bins, tile, coarsest, paints, sheet, out):
 def _flat(tile, limits, quick, sheet, out):
     """One colour wherever anything is hit."""
     flat, background = sixteen(quick.flat), sixteen(quick.background)
-    for p in range(np.uint64(0), _PIXELS, _SIXTEEN):
+    for p in range(np.uint64(0), PIXELS, _SIXTEEN):
         store(sheet.colour, p, blend(load_numbers(sheet.number, p) > 0, flat, background))
     return 0
 
@@ -302,23 +295,22 @@ def _shade(tile, limits, quick, sheet, out):
     row = tile.top
     for k in range(np.uint64(0), alike + mixed, np.uint64(2)):
         if row < tile.bottom:
-            _fetch_row(tile, row, out)
+            fetch_row(tile, row, out)
             row += 1
         p, q = np.uint64(sheet.blocks[k]), np.uint64(sheet.blocks[k + _ONE])
         if k < alike:
             spread_rows(sheet.table, sheet.firsts[k], sheet.firsts[k + _ONE], sheet.columns)
         else:
             gather_to_columns(sheet.table, sheet.number, p, q, sheet.columns)
-        (x, y), (x2, y2) = _pixel(np.int64(p)), _pixel(np.int64(q))
+        (x, y), (x2, y2) = pixel_of(np.int64(p)), pixel_of(np.int64(q))
         x, y = columns + two(np.float32(x), np.float32(x2)), rows + two(np.float32(y), np.float32(y2))
-        red, green, blue, error, none = _light(quick, sheet, x, y, x + left, up - y, limits)
-        colour, hit = red >> 16 | (green >> 8 & 0xFF00) | (blue & 0xFF0000), load_two(sheet.number, p, q) > 0
+        colour, sure = _light(quick, sheet, x, y, x + left, up - y, limits)
+        hit = load_two(sheet.number, p, q) > 0
         store_pair(sheet.colour, p, q, blend(hit, colour, quick.background))
         if certain:
-            apart = _apart(red, error[0]) | _apart(green, error[1]) | _apart(blue, error[2])
-            bits = bits_of(hit & (none | ((apart >> _PARTS) > 0)))
-            close = _list(sheet, close, p, bits & 0xFFFF)
-            close = _list(sheet, close, q, bits >> 16)
+            bits = bits_of(hit & ~sure)
+            close = list_block(sheet, close, p, bits & 0xFFFF)
+            close = list_block(sheet, close, q, bits >> 16)
     return close
 
 
@@ -329,7 +321,7 @@ def _sort_blocks(background, sheet):
     Returns how many they are, whole pairs both; what shows nothing becomes background.
     """
     alike, mixed = np.uint64(0), np.uint64(0)
-    for p in range(np.uint64(0), _PIXELS, _SIXTEEN):
+    for p in range(np.uint64(0), PIXELS, _SIXTEEN):
         store(sheet.colour, p, background)
         numbers = load_numbers(sheet.number, p)
         hit = np.int32(bits_of(numbers > 0))
@@ -345,13 +337,6 @@ def _sort_blocks(background, sheet):
     for k in range(mixed):
         sheet.blocks[alike + k] = sheet.mixed[k]
     return alike, mixed
-
-
-@inlined
-def _list(sheet, close, p, bits):
-    """List a block, if it has any bits; returns how many are listed then. Without a branch, which nobody could tell."""
-    sheet.close[close], sheet.bits[close] = p, bits
-    return close + (bits > 0)
 
 
 @inlined
@@ -401,23 +386,10 @@ def _light(quick, sheet, x, y, u, v, limits):
     off = times_plus(rough * size, longest, flat) * coarse
     error = times_plus(nearness, np.float32(quick.far), np.float32(quick.rounding))
     error = times_plus(times_plus(nearness, unit * size, np.float32(quick.weight)), off, error)
-    none = ~((disc > size2 * rim) & (error <= _HOPELESS))
-    error = lesser(error, _HOPELESS) * size  # what is not a number would be anything as a whole number
-    errors = times_plus(error, r, _SPARE), times_plus(error, g, _SPARE), times_plus(error, b, _SPARE)
-    return _parts(red, r), _parts(green, g), _parts(blue, b), errors, none
-
-
-@inlined
-def _parts(light, colour):
-    """A channel in parts of a byte, from half a byte on."""
-    return whole_numbers(lesser(times_plus(light, colour, _DARKEST), _BRIGHTEST))
-
-
-@inlined
-def _apart(channel, error):
-    """The upper bits are not 0 where a channel may be of one byte or of another."""
-    error = whole_numbers(error)
-    return channel + error ^ channel - error
+    red, green, blue = red * r, green * g, blue * b
+    apart = larger_size(larger_size(rest(red), rest(green)), rest(blue))
+    sure = (apart < times_plus(-error * size, greater(greater(r, g), b), _BORDER)) & (disc > size2 * rim)
+    return pack(rounded(red), rounded(green), rounded(blue)), sure
 
 
 @borrowing
@@ -429,8 +401,8 @@ def _keep_for_later(bins, tile, count, sheet):
         while bits:
             p = sheet.close[k] + lowest_bit(bits)
             bits &= bits - 1
-            x, y = _pixel(p)
-            if _is_in(tile, x, y):
+            x, y = pixel_of(p)
+            if is_in(tile, x, y):
                 sheet.late_columns[late], sheet.late_rows[late] = tile.left + x, tile.top + y
                 sheet.spheres[late] = sphere_of(bins.entries[last + sheet.number[p]])
                 late += 1
@@ -464,35 +436,6 @@ def shade_anew(view, paints, scratch, doubts, out):
     for k in range(count):
         start = (sheet.late_rows[k] - out.first_row) * out.row_bytes + sheet.late_columns[k] * out.pixel_bytes
         put_pixel(out, np.uint64(start), sheet.spheres[k])
-
-
-@inlined
-def put_pixel(out, start, colour):
-    for channel in range(3):
-        out.bytes[start + np.uint64(channel)] = colour >> 8 * channel & 255
-
-
-@inlined
-def _fetch_row(tile, row, out):
-    """A row of a tile will be written to."""
-    start = np.uint64((row - out.first_row) * out.row_bytes + tile.left * out.pixel_bytes)
-    for at in range(np.uint64(0), np.uint64((tile.right - tile.left) * out.pixel_bytes), np.uint64(64)):
-        fetch_to_write(out.bytes, start + at)
-
-
-@inlined
-def _put(tile, sheet, out):
-    """A tile's colours as bytes of the picture."""
-    step, right = np.uint64(out.pixel_bytes), min(tile.right, out.columns)
-    for row in range(tile.bottom - tile.top):
-        start = np.uint64((tile.top + row - out.first_row) * out.row_bytes + tile.left * out.pixel_bytes)
-        x, p = tile.left, np.uint64(SIDE * row)
-        while x + SIXTEEN <= right:
-            put_sixteen(out.bytes, start, step, sheet.colour, p, np.uint64(_STRIP))
-            x, start, p = x + SIXTEEN, start + _SIXTEEN * step, p + np.uint64(SIXTEEN // SIDE * _STRIP)
-        for pixel in range(tile.right - x):
-            put_pixel(out, start, sheet.colour[p + np.uint64(pixel // SIDE * _STRIP + pixel % SIDE)])
-            start += step
 
 
 @inlined

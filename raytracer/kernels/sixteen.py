@@ -57,20 +57,20 @@ def times_plus(typing, a, b, c):
     return kind(kind, kind, kind), lower
 
 
-def _estimate(instruction, exactly):
-    """A processor's own estimate to 14 bits, or what it stands for."""
+def _called(builder, name, result, *args):
+    """The call of a function of that name."""
+    kind = ir.FunctionType(result, [arg.type for arg in args])
+    return builder.call(get_or_insert_function(builder.module, kind, name), args)
+
+
+def _by_sixteens(feature, instruction, exactly):
+    """An instruction, on each sixteen of vectors, or what it stands for."""
 
     def lower(context, builder, sig, args):
-        (x,) = args
-        if not PROCESSOR.get("avx512f"):
-            return exactly(builder, x)
-        bits = ir.IntType(SIXTEEN)
-        vector = SINGLES.vector
-        function = get_or_insert_function(
-            builder.module, ir.FunctionType(vector, [vector, vector, bits]), f"llvm.x86.avx512.{instruction}.ps.512"
-        )
-        parts = [_part(builder, x, start) for start in range(0, x.type.count, SIXTEEN)]
-        return _joined(builder, [builder.call(function, [part, part, ir.Constant(bits, -1)]) for part in parts])
+        if not PROCESSOR.get(feature):
+            return exactly(builder, *args)
+        parts = [[_part(builder, arg, start) for arg in args] for start in range(0, args[0].type.count, SIXTEEN)]
+        return _joined(builder, [instruction(builder, *some) for some in parts])
 
     return lower
 
@@ -78,6 +78,16 @@ def _estimate(instruction, exactly):
 def _part(builder, x, start):
     """Sixteen of a vector."""
     return builder.shuffle_vector(x, x, _order(range(start, start + SIXTEEN)))
+
+
+def _estimate(instruction, exactly):
+    """A processor's own estimate to 14 bits, or what it stands for."""
+
+    def estimate(builder, x):
+        all_of_them = ir.Constant(ir.IntType(SIXTEEN), -1)
+        return _called(builder, f"llvm.x86.avx512.{instruction}.ps.512", x.type, x, x, all_of_them)
+
+    return _by_sixteens("avx512f", estimate, exactly)
 
 
 def _over(builder, x):
@@ -126,8 +136,87 @@ def sixteen(typing, number):
 @intrinsic
 def whole_numbers(typing, singles):
     """Singles cut off to whole numbers."""
-    kind = INTEGERS[FLOATS.index(singles) - 1]
+    kind = _numbers_of(singles)
     return kind(singles), lambda context, builder, sig, args: builder.fptosi(args[0], kind.vector)
+
+
+def _on_sixteen(instruction, result, *flags):
+    """A masked instruction of AVX-512 on sixteen singles, without a mask; the last of its flags comes at the end."""
+
+    def call(builder, *args):
+        bits, (*before, last) = ir.IntType(SIXTEEN), [ir.Constant(_INT32, flag) for flag in flags]
+        args = [*args, *before, ir.Constant(result, ir.Undefined), ir.Constant(bits, -1), last]
+        return _called(builder, f"llvm.x86.avx512.mask.{instruction}.512", result, *args)
+
+    return call
+
+
+_NEAREST, _AS_IT_IS, _LARGEST_SIZE = 0, 4, 11
+_rest = _on_sixteen("reduce.ps", SINGLES.vector, _NEAREST, _AS_IT_IS)
+_larger = _on_sixteen("range.ps", SINGLES.vector, _LARGEST_SIZE, _AS_IT_IS)
+_rounded = _on_sixteen("cvtps2dq", NUMBERS.vector, _AS_IT_IS)
+
+
+@intrinsic
+def rest(typing, x):
+    """How far singles are above the nearest whole numbers."""
+
+    def exactly(builder, x):
+        return builder.fsub(x, _instruction("llvm.rint")(builder, x))
+
+    return x(x), _by_sixteens("avx512dq", _rest, exactly)
+
+
+@intrinsic
+def larger_size(typing, a, b):
+    """The larger of |a| and |b|; if one is not a number, the other."""
+
+    def exactly(builder, *args):
+        return _instruction("llvm.maxnum")(builder, *[_instruction("llvm.fabs")(builder, arg) for arg in args])
+
+    return a(a, b), _by_sixteens("avx512dq", _larger, exactly)
+
+
+def _numbers_of(singles):
+    """The type of whole numbers that are as many as these singles."""
+    return INTEGERS[FLOATS.index(singles) - 1]
+
+
+@intrinsic
+def rounded(typing, x):
+    """The nearest whole numbers of singles."""
+    kind = _numbers_of(x)
+
+    def exactly(builder, x):
+        return builder.fptosi(_instruction("llvm.rint")(builder, x), kind.vector)
+
+    return kind(x), _by_sixteens("avx512f", _rounded, exactly)
+
+
+@intrinsic
+def pack(typing, red, green, blue):
+    """Colours as one number each, red in the lowest byte, of channels that are not below 0; 255 of those above it."""
+    return red(red, green, blue), _by_sixteens("avx512bw", _packed, _shifted)
+
+
+def _packed(builder, red, green, blue):
+    """By instructions that cut off what is beyond a byte."""
+    words, bytes_ = ir.VectorType(ir.IntType(16), 2 * SIXTEEN), ir.VectorType(_BYTE, 4 * SIXTEEN)
+    pairs = [_called(builder, "llvm.x86.avx512.packssdw.512", words, a, b) for a, b in ((red, green), (blue, blue))]
+    channels = _called(builder, "llvm.x86.avx512.packuswb.512", bytes_, *pairs)  # four of red, of green, of blue, …
+    order = [4 * SIDE * quad + SIDE * channel + i for quad in range(SIDE) for i in range(SIDE) for channel in range(4)]
+    return builder.bitcast(builder.shuffle_vector(channels, channels, _order(order)), NUMBERS.vector)
+
+
+def _shifted(builder, *channels):
+    """By whichever instructions there are."""
+    kind, packed = channels[0].type, None
+    for i, channel in enumerate(channels):
+        most, places = (ir.Constant(kind, [number] * kind.count) for number in (255, 8 * i))
+        byte = builder.select(builder.icmp_signed("<", channel, most), channel, most)
+        byte = builder.shl(byte, places)
+        packed = builder.or_(packed, byte) if packed else byte
+    return packed
 
 
 @intrinsic
