@@ -336,6 +336,8 @@ class Quick(NamedTuple):
     focus: float  # the focal length in pixels
     middle_x: float  # the column of the ray (0, 0, −1)
     middle_y: float  # and the row
+    height: float  # of the whole picture
+    back: float  # the focal length by half of that
     steep: float  # s of `quick`, at most
     widest: float  # m for which that is so
     lights: np.ndarray  # float32, flat, eight numbers each: place in the camera's axes, colour, and its largest channel
@@ -351,6 +353,7 @@ class Paints(NamedTuple):
 
     quick: Quick
     background: np.ndarray  # float64 (3,), from 0 to 255
+    backdrop: np.ndarray  # int32 (16,): its bytes as one number, red the lowest, sixteen times
     flat: np.ndarray  # float64 (3,), likewise: the one colour of a stage that has but one
     lights: np.ndarray  # float64 (n, 6): the place as seen from the eye, the colour
     colours: np.ndarray  # float64, flat: red, green, blue, 0 of each material
@@ -377,6 +380,7 @@ class FullPaints(NamedTuple):
     """What the stage `full` is painted with."""
 
     background: np.ndarray  # float64 (3,), from 0 to 255
+    backdrop: np.ndarray  # int32 (16,): its bytes as one number, red the lowest, sixteen times
     behind: tuple[float, float, float]  # the background's colour
     lights: np.ndarray  # float64 (n, 6): the place as seen from the eye, the colour
     surfaces: np.ndarray  # float64, flat: see `full.surfaces_of`

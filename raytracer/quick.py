@@ -122,13 +122,13 @@ def make_quick(
     )  # fmt: skip
     return Quick(
         usable, camera.u, camera.v, camera.w, focus,
-        middle_x, middle_y, steep, widest,
+        middle_x, middle_y, float(raster.whole_height), focal_length(camera.fov), steep, widest,
         np.array(rows if usable else [], np.float32).reshape(-1),
-        weight, 5 * U * farthest, (16 + len(rows)) * U * weight, _packed(background), _packed(flat),
+        weight, 5 * U * farthest, (16 + len(rows)) * U * weight, packed(background), packed(flat),
     )  # fmt: skip
 
 
-def _packed(colour: Colour) -> int:
+def packed(colour: Colour) -> int:
     """Three bytes as one number, red the lowest."""
     red, green, blue = (int(channel) for channel in colour)
     return red | green << 8 | blue << 16

@@ -60,7 +60,7 @@ from raytracer.lookup import light_cells, reach_of, tree_of
 from raytracer.mirrors import NO_MIRRORS, see_mirrors
 from raytracer.plan import Plan
 from raytracer.pool import cores, share
-from raytracer.quick import make_quick
+from raytracer.quick import make_quick, packed
 from raytracer.scene import Camera, Colour, Light, Materials, Scene, Triangles
 from raytracer.settle import Bundle, Index, Targets, known_in_integers, polish, settled
 from raytracer.shading import to_byte
@@ -87,6 +87,7 @@ class Workspace:
 
     def __init__(self) -> None:
         self._arrays: dict[tuple[str, int], np.ndarray] = {}
+        self.nbytes = 0
         self.desks: dict[int, Desk] = {}  # of the threads
 
     def array(self, size: int, kind: type, name: str, worker: int = 0) -> np.ndarray:
@@ -97,17 +98,15 @@ class Workspace:
         """An array of that size or more."""
         kept = self._arrays.get((name, worker))
         if kept is None or len(kept) < size:
+            self.nbytes -= 0 if kept is None else kept.nbytes
             kept = self._arrays[name, worker] = aligned(size, kind)
+            self.nbytes += kept.nbytes
         return kept
 
     def zeros(self, size: int, kind: type, name: str, worker: int = 0) -> np.ndarray:
         array = self.array(size, kind, name, worker)
         array[:] = 0
         return array
-
-    @property
-    def nbytes(self) -> int:
-        return sum(array.nbytes for array in self._arrays.values())
 
 
 _idle: LifoQueue[Workspace] = LifoQueue(2)
@@ -323,6 +322,12 @@ def _bytes_of(colour: Colour) -> np.ndarray:
     return np.asarray(to_byte(np.array(colour)))
 
 
+@lru_cache(maxsize=64)
+def _backdrop(colour: Colour) -> np.ndarray:
+    """See `Paints.backdrop`."""
+    return np.full(16, packed(tuple(_bytes_of(colour).tolist())), np.int32)
+
+
 def make_paints(plan: Plan, screen: Screen) -> Paints:
     """What the plan's stage is painted with."""
     flat, background = plan.stage.flat(plan.scene)
@@ -332,7 +337,7 @@ def make_paints(plan: Plan, screen: Screen) -> Paints:
     quick = make_quick(
         plan.raster, plan.lights, screen.unit, plan.scene.materials.diffuse_range, *(tuple(c.tolist()) for c in colours)
     )
-    return Paints(quick, *colours, lights, diffuse.reshape(-1))
+    return Paints(quick, colours[0], _backdrop(background), colours[1], lights, diffuse.reshape(-1))
 
 
 @lru_cache(maxsize=8)
@@ -349,7 +354,8 @@ def make_full_paints(plan: Plan, screen: Screen) -> FullPaints:
     lights = tuple(light.position for light in plan.lights) if terms.shadows else ()
     glass = _glass(scene, screen) if terms.mirrors else NO_MIRRORS
     return FullPaints(
-        _bytes_of(scene.background), scene.background, _lights_from_eye(plan.lights, scene.camera, screen.unit),
+        _bytes_of(scene.background), _backdrop(scene.background), scene.background,
+        _lights_from_eye(plan.lights, scene.camera, screen.unit),
         surfaces_of(scene.materials).reshape(-1),
         *light_cells(*shapes, screen.unit, reach_of(*shapes, screen.unit, screen.view.eye), lights, screen.kernels),
         tree_of(*shapes, screen.unit, screen.kernels), glass,
@@ -366,9 +372,11 @@ def _glass(scene: Scene, screen: Screen) -> Mirrors:
 
 _AXIS = 0.0, 0.0, 0.0
 _NO_QUICK = Quick(
-    False, _AXIS, _AXIS, _AXIS, 1.0, 0.0, 0.0, 0.0, 0.0, np.empty(0, np.float32), 0.0, 0.0, 0.0, 0, 0
+    False, _AXIS, _AXIS, _AXIS, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, np.empty(0, np.float32), 0.0, 0.0, 0.0, 0, 0
 )  # fmt: skip
-_NO_PAINTS = Paints(_NO_QUICK, np.zeros(3), np.zeros(3), np.empty((0, 6)), Materials().diffuse.reshape(-1))
+_NO_PAINTS = Paints(
+    _NO_QUICK, np.zeros(3), np.zeros(16, np.int32), np.zeros(3), np.empty((0, 6)), Materials().diffuse.reshape(-1)
+)
 
 
 _NO_SPHERES = np.empty(0)

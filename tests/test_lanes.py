@@ -108,11 +108,11 @@ def test_boxes_and_pixels_are_written_in_rows():
 @pytest.mark.parametrize("step", [3, 4])
 def test_pixels_of_one_colour(step):
     @borrowing
-    def run(picture, step):
-        k.put_alike(picture, np.uint64(step), np.uint64(step), np.int32(0x030201))
+    def run(picture, step, colours):
+        k.put_alike(picture, np.uint64(step), np.uint64(step), colours)
 
     picture = np.full((k.ALIKE + 2, step), 7, np.uint8)
-    run(picture.reshape(-1), step)
+    run(picture.reshape(-1), step, np.full(16, 0x030201, np.int32))
     expected = np.full((k.ALIKE + 2, step), 7, np.uint8)
     expected[1:-1, :3] = 1, 2, 3
     np.testing.assert_array_equal(picture, expected)

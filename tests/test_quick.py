@@ -7,6 +7,7 @@ import pytest
 
 from raytracer import backend, make_plan, plain
 from raytracer.bench import spread
+from raytracer.plan import Plan
 from raytracer.quick import U, coarseness_of, error_of, flatness_of, make_quick, near_of
 from raytracer.render import draw
 from raytracer.scene import Camera, Light, Materials, Scene, Spheres
@@ -172,18 +173,63 @@ def full_tiles() -> Scene:
     return Scene(camera, (0.0, 0.0, 0.0), (Light((1.0, 2.0, 3.0), (1.0, 1.0, 1.0)),), materials, spheres)
 
 
-def test_there_is_room_for_the_doubts_of_a_tile_and_of_all_that_was_put_off():
-    plan = make_plan(full_tiles(), "diffuse", 128, 224, path=KERNELS)
+def painted(plan: Plan, room: int = 40_000):
+    """What `paint_diffuse` makes of a plan: whether it is done, which doubts are left, and how many there were."""
     with open_screen(plan.scene, plan.raster, KERNELS, 1) as screen:
-        paints, picture, room = (
-            make_paints(plan, screen),
-            np.zeros((224, 128, 3), np.uint8),
-            np.full(40_000, -7, np.int64),
-        )
-        room[0], end = 0, len(screen.desks[0].doubts)
-        desk, tiles = screen.desks[0]._replace(doubts=room[:end]), screen.tiles_of(slice(0, 224))
+        paints, picture = make_paints(plan, screen), np.zeros((plan.raster.height, plan.raster.width, 3), np.uint8)
+        doubts, end = np.full(room, -7, np.int64), len(screen.desks[0].doubts)
+        doubts[0] = 0
+        desk, tiles = screen.desks[0]._replace(doubts=doubts[:end]), screen.tiles_of(slice(0, plan.raster.height))
         done = KERNELS.paint_diffuse(screen.view, screen.slow, screen.bins, tiles, *desk, paints, make_canvas(picture))
     assert paints.quick.usable
+    assert (doubts[end:] == -7).all()
+    return done, doubts[1 : 1 + doubts[0]].tolist(), int((doubts[1:end] != -7).sum()), picture
+
+
+def test_there_is_room_for_the_doubts_of_a_tile_and_of_all_that_was_put_off():
+    done, left, listed, _ = painted(make_plan(full_tiles(), "diffuse", 128, 224, path=KERNELS))
     assert not done
-    assert 5 * 4000 < room[0] < end
-    assert (room[end:] == -7).all()
+    assert not left
+    assert 5 * 4000 < listed < 32_768
+
+
+def one_tangent_ray(*others: tuple[float, float, float, float]) -> Scene:
+    """The ray straight ahead touches the first sphere: 3² + 4² = 5²."""
+    balls = np.array([(3 / 16, 4 / 16, -3.0, 5 / 16), *others])
+    count, materials = len(balls), Materials(np.linspace(0.1, 1.0, 11 * len(balls)).reshape(-1, 11))
+    numbers = np.arange(count, dtype=np.int32)
+    light = Light((1.0, 2.0, 3.0), (1.0, 1.0, 1.0))
+    spheres = Spheres(balls[:, 3].copy(), balls[:, :3].copy(), numbers, numbers, materials)
+    return Scene(Camera((0.0, 0.0, 0.0)), (0.1, 0.2, 0.3), (light,), materials, spheres)
+
+
+@pytest.mark.parametrize("stage", ["hit", "diffuse"])
+def test_what_two_fold_float64_cannot_tell_is_left_to_integers(stage):
+    scene, (width, height) = one_tangent_ray((0.0, 0.1, -4.0, 0.3)), (64, 48)
+    done, left, listed, _ = painted(make_plan(scene, "diffuse", width, height, path=KERNELS))
+    assert done
+    assert set(left) == {height // 2 * width + width // 2}
+    assert listed <= 3  # not once a lane
+    np.testing.assert_array_equal(*(drawn(scene, stage, path, (width, height)) for path in (KERNELS, plain)))
+
+
+def test_doubts_of_float64_are_decided_by_whoever_finds_them():
+    plan = make_plan(spread(30_000, seed=3), "diffuse", 640, 360, path=KERNELS)
+    done, left, listed, picture = painted(plan)
+    assert done
+    assert not left
+    assert listed > 0
+    np.testing.assert_array_equal(picture, draw(replace(plan, path=plain)))
+
+
+def test_of_equal_spheres_the_first_is_seen():
+    scene = spread(300, seed=10)
+    spheres, rng = scene.spheres, np.random.default_rng(11)
+    where = np.concatenate([np.arange(300), rng.permutation(300)])
+    material, order = np.sort(rng.integers(0, 64, 600)).astype(np.int32), np.arange(600, dtype=np.int32)
+    twins = Spheres(spheres.radii[where], spheres.centres[where], material, order, spheres.materials)
+    twice = replace(scene, spheres=twins)
+    _, left, listed, _ = painted(make_plan(twice, "diffuse", *SIZE, path=KERNELS))
+    assert not left
+    assert listed > 1000
+    np.testing.assert_array_equal(*(drawn(twice, "diffuse", path) for path in (KERNELS, plain)))

@@ -643,18 +643,22 @@ def put_pixels(typing, picture, start, step, red, green, blue):
 
 
 @intrinsic
-def put_alike(typing, picture, start, step, colour):
-    """ALIKE pixels of one colour, an int32 with red in the lowest byte, as `put_pixels` puts eight."""
+def put_alike(typing, picture, start, step, colours):
+    """ALIKE pixels of one colour, as `put_pixels` puts eight: an array has it sixteen times, red in the lowest byte.
+
+    Of a number, the compiler would make the bytes one by one.
+    """
 
     def lower(context, builder, sig, args):
-        picture, start, step, colour = args
-        wide = builder.bitcast(_spread(builder, colour, SIXTEEN), ir.VectorType(_BYTE, 4 * SIXTEEN))
+        picture, start, step, colours = args
+        zero, bytes_ = ir.Constant(start.type, 0), ir.VectorType(_BYTE, 4 * SIXTEEN)
+        wide = builder.load(_address(context, builder, sig.args[3], colours, zero, bytes_), align=4)
         three = [4 * (pixel % SIXTEEN) + byte for pixel in range(ALIKE) for byte in range(3)]
         four = [byte % (4 * SIXTEEN) for byte in range(4 * ALIKE)]
         _put_bytes(context, builder, sig.args[0], picture, start, step, wide, three, four)
         return context.get_dummy_value()
 
-    return types.void(picture, types.uint64, types.uint64, types.int32), lower
+    return types.void(picture, types.uint64, types.uint64, colours), lower
 
 
 def _put_bytes(context, builder, kind, picture, start, step, wide, three, four):

@@ -68,6 +68,7 @@ from raytracer.kernels.strips import (
     pixel_of,
     put_pixel,
     put_tile,
+    start_of,
 )
 from raytracer.kernels.surfaces import diffuse_at, meet_spheres
 from raytracer.kernels.visibility import AHEAD, corners_of, fetch, from_eye, holding, sphere_of
@@ -424,7 +425,7 @@ def shade_anew(view, paints, scratch, doubts, out):
     for k in range(np.uint64(0), np.uint64(count), np.uint64(WIDTH)):
         where, rows, columns = load(sheet.spheres, k), load(sheet.late_rows, k), load(sheet.late_columns, k)
         t, direction, doubt = meet_spheres(view, rows, columns, where)
-        bits = np.int32(bits_of(doubt))
+        bits = np.int32(bits_of(doubt)) & (1 << min(count - np.int64(k), WIDTH)) - 1
         while bits:
             pixel = k + np.uint64(lowest_bit(bits))
             bits &= bits - 1
@@ -434,8 +435,7 @@ def shade_anew(view, paints, scratch, doubts, out):
         red, green, blue = whole(to_byte(red)), whole(to_byte(green)), whole(to_byte(blue))
         store(sheet.spheres, k, red + green * 256 + blue * 65536)
     for k in range(count):
-        start = (sheet.late_rows[k] - out.first_row) * out.row_bytes + sheet.late_columns[k] * out.pixel_bytes
-        put_pixel(out, np.uint64(start), sheet.spheres[k])
+        put_pixel(out, start_of(out, sheet.late_rows[k], sheet.late_columns[k]), sheet.spheres[k])
 
 
 @inlined

@@ -42,7 +42,7 @@ def list_block(sheet, close, p, bits):
 @inlined
 def fetch_row(tile, row, out):
     """A row of a tile will be written to."""
-    start = np.uint64((row - out.first_row) * out.row_bytes + tile.left * out.pixel_bytes)
+    start = start_of(out, row, tile.left)
     for at in range(np.uint64(0), np.uint64((tile.right - tile.left) * out.pixel_bytes), np.uint64(64)):
         fetch_to_write(out.bytes, start + at)
 
@@ -52,7 +52,7 @@ def put_tile(tile, sheet, out):
     """A tile's colours as bytes of the picture."""
     step, right = np.uint64(out.pixel_bytes), min(tile.right, out.columns)
     for row in range(tile.bottom - tile.top):
-        start = np.uint64((tile.top + row - out.first_row) * out.row_bytes + tile.left * out.pixel_bytes)
+        start = start_of(out, tile.top + row, tile.left)
         x, p = tile.left, np.uint64(SIDE * row)
         while x + SIXTEEN <= right:
             put_sixteen(out.bytes, start, step, sheet.colour, p, np.uint64(STRIP))
@@ -60,6 +60,12 @@ def put_tile(tile, sheet, out):
         for pixel in range(tile.right - x):
             put_pixel(out, start, sheet.colour[p + np.uint64(pixel // SIDE * STRIP + pixel % SIDE)])
             start += step
+
+
+@inlined
+def start_of(out, row, column):
+    """Where a pixel's bytes begin."""
+    return np.uint64((row - out.first_row) * out.row_bytes + column * out.pixel_bytes)
 
 
 @inlined

@@ -92,7 +92,7 @@ def _surface_of_hits(view, d, t, _, where):
 def colours_of_hits(view, paints, t, index, columns, rows, scratch, out):
     """The colours of single hits, float64 (n, 3): t, index and pixels are arrays of whole eights."""
     for k in range(np.uint64(0), np.uint64(len(t)), np.uint64(WIDTH)):
-        _, _, d = _rays_of(view, load(rows, k), load(columns, k))
+        _, _, d = rays_of(view, load(rows, k), load(columns, k))
         red, green, blue = colours(view, paints, d, load(t, k), load(columns, k), load(index, k), scratch)
         store(scratch.batch, 0, red)
         store(scratch.batch, WIDTH, green)
@@ -110,7 +110,7 @@ def diffuse_at(view, paints, d, t, columns, index, scratch):
 @inlined
 def meet_spheres(view, rows, columns, where):
     """Where the rays of pixels meet the spheres at these places: t, D, and where float64 cannot tell."""
-    across, up, d = _rays_of(view, rows, columns)
+    across, up, d = rays_of(view, rows, columns)
     a = (across * view.a2 + gather(view.a1, rows)) * across + gather(view.a0, rows)
     x, y, z, radius = gather_rows(view.balls, where)
     hu, hv, hw, c, edge = from_eye(view, x, y, z, radius)
@@ -119,7 +119,7 @@ def meet_spheres(view, rows, columns, where):
 
 
 @inlined
-def _rays_of(view, rows, columns):
+def rays_of(view, rows, columns):
     """U, V and D of the rays of pixels."""
     across, up, u, v, back = gather(view.across, columns), gather(view.up, rows), view.u, view.v, view.back
     d = (

@@ -13,6 +13,7 @@ from raytracer.arrays import APART, Tile
 from raytracer.certified import fine_direction, refine
 from raytracer.kernels.bounds import TILE_HEIGHT, TILE_WIDTH
 from raytracer.kernels.compiler import borrowing, inlined, variant
+from raytracer.kernels.doubts import decide_diffuse, decide_flat, leave_doubts
 from raytracer.kernels.full import radiance
 from raytracer.kernels.lanes import (
     ALIKE,
@@ -66,6 +67,8 @@ def _paint(view, slow, bins, tiles, scratch, doubts, paints, out):
         number = -1 if full else _take(tiles)
         if number < 0 or scratch.quick.late[0] > FEW_LATE:
             finish(view, paints, scratch, doubts, out)
+        if number < 0:
+            decide(view, slow, bins, paints, scratch, doubts, out)
         if full:
             return False
     return True
@@ -116,15 +119,14 @@ def _background(paints):
 @borrowing
 def _fill_tile(scratch, tile, paints, out):
     """The background."""
-    red, green, blue = np.int32(paints.background[0]), np.int32(paints.background[1]), np.int32(paints.background[2])
-    colour, step, right = red | green << 8 | blue << 16, np.uint64(out.pixel_bytes), min(tile.right, out.columns)
+    step, right = np.uint64(out.pixel_bytes), min(tile.right, out.columns)
     for row in range(tile.top, tile.bottom):
         start, x = np.uint64((row - out.first_row) * out.row_bytes + tile.left * out.pixel_bytes), tile.left
         while x + ALIKE <= right:
-            put_alike(out.bytes, start, step, np.int32(colour))
+            put_alike(out.bytes, start, step, paints.backdrop)
             x, start = x + ALIKE, start + np.uint64(ALIKE) * step
         for _ in range(x, tile.right):
-            put_pixel(out, start, colour)
+            put_pixel(out, start, paints.backdrop[0])
             start += step
 
 
@@ -243,18 +245,23 @@ _normal_tile = variant(_shaded_tile, "_normal_tile", shade=normal)
 _full_tile = variant(_shaded_tile, "_full_tile", shade=_full)
 
 
-def _painter(name, paint_tile, fill_tile=_fill_tile, see=see_tile, paint_quickly=never_quickly, finish=nothing_left):
+def _painter(
+    name, paint_tile, fill_tile=_fill_tile, see=see_tile, paint_quickly=never_quickly, finish=nothing_left,
+    decide=leave_doubts,
+):  # fmt: skip
     return variant(
-        _paint, name, paint_tile=paint_tile, fill_tile=fill_tile, see=see, paint_quickly=paint_quickly, finish=finish
-    )
+        _paint, name, paint_tile=paint_tile, fill_tile=fill_tile, see=see, paint_quickly=paint_quickly, finish=finish,
+        decide=decide,
+    )  # fmt: skip
 
 
-paint_flat = _painter("paint_flat", _flat_tile, paint_quickly=flat_quickly)
-paint_diffuse = _painter("paint_diffuse", _diffuse_tile, paint_quickly=diffuse_quickly, finish=shade_anew)
+paint_flat = _painter("paint_flat", _flat_tile, paint_quickly=flat_quickly, decide=decide_flat)
+_certainly = {"paint_quickly": diffuse_quickly, "finish": shade_anew, "decide": decide_diffuse}
+paint_diffuse = _painter("paint_diffuse", _diffuse_tile, **_certainly)
 paint_diffuse_unchecked = _painter(
     "paint_diffuse_unchecked", _diffuse_tile, see=see_tile_unchecked, paint_quickly=diffuse_quickly_unchecked
 )
-paint_diffuse_any = _painter("paint_diffuse_any", _diffuse_any_tile, paint_quickly=diffuse_quickly, finish=shade_anew)
+paint_diffuse_any = _painter("paint_diffuse_any", _diffuse_any_tile, **_certainly)
 paint_full = _painter("paint_full", _full_tile)
 paint_normal = _painter("paint_normal", _normal_tile)
 find_hits = _painter("find_hits", _hits_tile, fill_tile=_no_hits_tile)

@@ -16,7 +16,7 @@ from raytracer.certified import (
     passes,
     refine,
 )
-from raytracer.kernels.compiler import compiled, inlined
+from raytracer.kernels.compiler import borrowing, compiled, inlined
 from raytracer.kernels.lanes import WIDTH, all_of, bits_of, gather_rows, is_hit, load, spread, store
 from raytracer.twofold import select
 
@@ -113,28 +113,34 @@ def fine_rays(across, up, height, u, v, w, back):
 def nearest_twofold(origins, rays, candidates, balls, sides, nearest):
     """`plain.nearest_twofold`."""
     best, best_error, best_index, unsure = nearest
+    table = balls.reshape(-1)
     for k in range(len(origins)):
-        ox, oy, oz = origins[k, 0], origins[k, 1], origins[k, 2]
-        dx, dy, dz, m = rays.x[k], rays.y[k], rays.z[k], rays.reach[k]
-        dx_low, dy_low, dz_low = rays.x_low[k], rays.y_low[k], rays.z_low[k]
-        square, t_low = inner(dx, dy, dz, dx, dy, dz), 0.0
+        found = best[k], 0.0, best_error[k], np.int64(best_index[k]), unsure[k]
+        origin = origins[k, 0], origins[k, 1], origins[k, 2]
+        ray = rays.x[k], rays.y[k], rays.z[k], rays.x_low[k], rays.y_low[k], rays.z_low[k], rays.reach[k]
         for place in range(candidates.starts[k], candidates.starts[k + 1]):
-            i = candidates.ids[place]
-            cx, cy, cz, radius = balls[i, 0], balls[i, 1], balls[i, 2], balls[i, 3]
-            lx, ly, lz, c, c_error, size = look(ox, oy, oz, cx, cy, cz, radius)
-            t, error, low = meet(inner(dx, dy, dz, lx, ly, lz), square, c, c_error, size, radius, m, T_TOLERANCE)
-            if not contends(t, error, low, best[k], best_error[k]) or _equal(balls, best_index[k], i):
-                continue
-            known, known_low, known_error = _known_side(sides, i)
-            lx, ly, lz, lx_low, ly_low, lz_low, c, c_low, c_error, size = look_twofold(
-                ox, oy, oz, cx, cy, cz, radius, known, known_low, known_error
-            )
-            t, rest, error, low = meet_twofold(
-                lx, ly, lz, lx_low, ly_low, lz_low, c, c_low, c_error, size, dx, dy, dz, dx_low, dy_low, dz_low, m
-            )
-            best[k], t_low, best_error[k], best_index[k], unsure[k] = nearer(
-                best[k], t_low, best_error[k], best_index[k], unsure[k], t, rest, error, low, i
-            )
+            i = np.int64(candidates.ids[place])
+            found = try_twofold(found, origin, ray, table, i, _known_side(sides, i))
+        best[k], _, best_error[k], best_index[k], unsure[k] = found
+
+
+@borrowing
+def try_twofold(found, origin, ray, table, i, side):
+    """The nearest hit so far, as `nearer` has it, after sphere i; of equal ones it is the first."""
+    (best, _, best_error, best_index, _), (ox, oy, oz), (dx, dy, dz, dx_low, dy_low, dz_low, m) = found, origin, ray
+    cx, cy, cz, radius = table[4 * i], table[4 * i + 1], table[4 * i + 2], table[4 * i + 3]
+    lx, ly, lz, c, c_error, size = look(ox, oy, oz, cx, cy, cz, radius)
+    h, square = inner(dx, dy, dz, lx, ly, lz), inner(dx, dy, dz, dx, dy, dz)
+    t, error, low = meet(h, square, c, c_error, size, radius, m, T_TOLERANCE)
+    if not contends(t, error, low, best, best_error):
+        return found
+    if _equal(table, best_index, i):
+        return best, found[1], best_error, min(best_index, i), found[4]
+    lx, ly, lz, lx_low, ly_low, lz_low, c, c_low, c_error, size = look_twofold(ox, oy, oz, cx, cy, cz, radius, *side)
+    t, rest, error, low = meet_twofold(
+        lx, ly, lz, lx_low, ly_low, lz_low, c, c_low, c_error, size, dx, dy, dz, dx_low, dy_low, dz_low, m
+    )
+    return nearer(*found, t, rest, error, low, i)
 
 
 @compiled
@@ -163,7 +169,8 @@ def _known_side(sides, i):
 
 
 @compiled
-def _equal(balls, j, i):
-    if j < 0 or balls[j, 3] != balls[i, 3]:
+def _equal(table, j, i):
+    a, b = 4 * i, 4 * j
+    if j < 0 or table[a + 3] != table[b + 3]:
         return False
-    return balls[j, 0] == balls[i, 0] and balls[j, 1] == balls[i, 1] and balls[j, 2] == balls[i, 2]
+    return table[a] == table[b] and table[a + 1] == table[b + 1] and table[a + 2] == table[b + 2]

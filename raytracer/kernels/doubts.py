@@ -1,0 +1,93 @@
+"""Doubtful pixels of spheres, decided in two-fold float64 and painted by whoever has found them.
+
+doubts ── _nearest ──> t, sphere ── paint_hits ──> bytes of the picture
+       └─ what two-fold float64 cannot tell either ──> doubts, for `settle`
+"""
+
+import numpy as np
+
+from raytracer.camera import fine_ray
+from raytracer.kernels.bounds import TILE_HEIGHT, TILE_WIDTH
+from raytracer.kernels.compiler import borrowing, inlined, variant
+from raytracer.kernels.lanes import WIDTH, load, store, whole
+from raytracer.kernels.sixteen import lowest_bit
+from raytracer.kernels.strips import put_pixel, start_of
+from raytracer.kernels.surfaces import diffuse_at, rays_of
+from raytracer.kernels.trace import try_twofold
+from raytracer.kernels.visibility import holding, sphere_of
+from raytracer.shading import to_byte
+
+
+def _decide_doubts(view, slow, bins, paints, scratch, doubts, out):
+    """Decide, paint and take off the list what two-fold float64 is certain of."""
+    if not paints.quick.usable or len(slow.ids):
+        return
+    sheet, width, hits = scratch.quick, len(view.across) - WIDTH, np.uint64(0)
+    count, doubts[0] = doubts[0], 0
+    for k in range(1, count + 1):
+        row, column = doubts[k] // width, doubts[k] % width
+        tile = row // TILE_HEIGHT * bins.columns + column // TILE_WIDTH
+        t, _, _, sphere, unsure = _nearest(view, bins, paints.quick, tile, row, column)
+        if unsure or bins.middles[tile] < bins.starts[tile + 1]:
+            doubts[0] += 1
+            doubts[doubts[0]] = doubts[k]
+        elif sphere < 0:
+            put_pixel(out, start_of(out, row, column), paints.quick.background)
+        else:
+            scratch.k[hits], sheet.spheres[hits] = t, sphere
+            sheet.late_rows[hits], sheet.late_columns[hits] = row, column
+            hits += np.uint64(1)
+            if hits == WIDTH:
+                paint_hits(view, paints, scratch, hits, out)
+                hits = np.uint64(0)
+    paint_hits(view, paints, scratch, hits, out)
+
+
+@borrowing
+def _nearest(view, bins, quick, tile, row, column):
+    """What a pixel sees of the spheres of its tile, as `certified.nearer` has it."""
+    found = np.inf, 0.0, 0.0, np.int64(-1), False
+    across, up = 2.0 * (column - quick.middle_x), 2.0 * (quick.middle_y - row)
+    ray = fine_ray(across, up, quick.height, quick.u, quick.v, quick.w, quick.back)
+    end = bins.middles[tile]
+    for some in range(bins.starts[tile], end, WIDTH):
+        bits = holding(bins.entries, some, end, column % TILE_WIDTH, row % TILE_HEIGHT)
+        while bits:
+            sphere = np.int64(sphere_of(bins.entries[some + lowest_bit(bits) // 2]))
+            bits &= bits - 1
+            found = try_twofold(found, view.eye, ray, view.balls, sphere, (np.nan, 0.0, 0.0))
+    return found
+
+
+@inlined
+def _flat_hits(view, paints, scratch, count, out):
+    for k in range(count):
+        sheet = scratch.quick
+        put_pixel(out, start_of(out, sheet.late_rows[k], sheet.late_columns[k]), paints.quick.flat)
+
+
+@inlined
+def _diffuse_hits(view, paints, scratch, count, out):
+    """As `surfaces.diffuse_of`; of up to eight."""
+    if not count:
+        return
+    sheet = scratch.quick
+    for spare in range(count, np.uint64(WIDTH)):
+        scratch.k[spare], sheet.spheres[spare] = scratch.k[0], sheet.spheres[0]
+        sheet.late_rows[spare], sheet.late_columns[spare] = sheet.late_rows[0], sheet.late_columns[0]
+    where, rows, columns = load(sheet.spheres, 0), load(sheet.late_rows, 0), load(sheet.late_columns, 0)
+    _, _, direction = rays_of(view, rows, columns)
+    red, green, blue = diffuse_at(view, paints, direction, load(scratch.k, 0), columns, where, scratch)
+    red, green, blue = whole(to_byte(red)), whole(to_byte(green)), whole(to_byte(blue))
+    store(sheet.spheres, 0, red + green * 256 + blue * 65536)
+    for k in range(count):
+        put_pixel(out, start_of(out, sheet.late_rows[k], sheet.late_columns[k]), sheet.spheres[k])
+
+
+decide_flat = variant(_decide_doubts, "decide_flat", paint_hits=_flat_hits)
+decide_diffuse = variant(_decide_doubts, "decide_diffuse", paint_hits=_diffuse_hits)
+
+
+@inlined
+def leave_doubts(view, slow, bins, paints, scratch, doubts, out):
+    """All of them."""
