@@ -214,12 +214,12 @@ def test_what_two_fold_float64_cannot_tell_is_left_to_integers(stage):
 
 
 def test_doubts_of_float64_are_decided_by_whoever_finds_them():
-    plan = make_plan(spread(30_000, seed=3), "diffuse", 640, 360, path=KERNELS)
-    done, left, listed, picture = painted(plan)
+    scene = spread(30_000, seed=3)
+    done, left, listed, picture = painted(make_plan(scene, "diffuse", 640, 360, path=KERNELS))
     assert done
     assert not left
     assert listed > 0
-    np.testing.assert_array_equal(picture, draw(replace(plan, path=plain)))
+    np.testing.assert_array_equal(picture, drawn(scene, "diffuse", plain, (640, 360)))
 
 
 def test_of_equal_spheres_the_first_is_seen():
