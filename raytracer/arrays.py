@@ -314,6 +314,7 @@ class QuickScratch(NamedTuple):
     doubt: np.ndarray  # int32 (rows of strips,), a bit a pixel
     table: np.ndarray  # float32, flat: eight numbers for each of the tile's list, for shading; the first row is free
     batch: np.ndarray  # float32, flat: what is computed of eight spheres at once, for drawing
+    numbers: np.ndarray  # float32, flat: see `kernels.alike`
     blocks: np.ndarray  # int32, the first pixel of blocks that show anything: first those of one sphere, then others
     firsts: np.ndarray  # int32, which sphere that is
     mixed: np.ndarray  # int32, the others

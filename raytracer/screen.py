@@ -76,6 +76,7 @@ _MOST_WORKERS = 8  # that sort: each counts all tiles anew
 _BAND_PIXELS = 1 << 18  # of a numpy stage's block
 _PIXELS_A_MOMENT, _SPHERES_A_MOMENT = 1 << 22, 1 << 17  # what is drawn in a few milliseconds
 _WORTH_A_THREAD = 8  # a moment
+_NUMBERS = 1 << 14  # of spheres of a tile, for the blocks that show but one
 _STACK = 8 * 24  # boxes that may wait, eight a level
 _KEPT = 1 << 26  # bytes of a workspace that is kept
 
@@ -443,6 +444,7 @@ def _quick_scratch(workspace: Workspace, kernels: ModuleType, worker: int) -> Qu
         doubt=array(pixels // 4, np.int32, "doubt"),
         table=array(8 * (kernels.MOST + 16), np.float32, "table"),
         batch=array(160, np.float32, "batch"),
+        numbers=array(_NUMBERS, np.float32, "numbers"),
         blocks=array(room, np.int32, "blocks"),
         firsts=array(room, np.int32, "firsts"),
         mixed=array(room, np.int32, "mixed"),

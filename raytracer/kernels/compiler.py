@@ -18,7 +18,7 @@ from types import FunctionType, ModuleType
 import numba
 from numba.extending import overload, register_jitable
 
-from raytracer import bounce, boxes, camera, certified, facets, machine_code, methods, quick, shading, twofold
+from raytracer import alike, bounce, boxes, camera, certified, facets, machine_code, methods, quick, shading, twofold
 from raytracer.kernels.lanes import PROCESSOR, MarkPairs, Marks, Mask, blend, fused
 
 
@@ -58,7 +58,7 @@ def _compile_calls_into(module: ModuleType) -> None:
             register_jitable(function)
 
 
-_SOURCES = (twofold, certified, camera, boxes, facets, shading, bounce, methods, quick)
+_SOURCES = (twofold, certified, camera, boxes, facets, shading, bounce, methods, quick, alike)
 _OVERLOADED = (twofold.select, twofold.exponent, twofold.scale)
 if PROCESSOR.get("fma"):
     _OVERLOADED += (twofold.two_product,)

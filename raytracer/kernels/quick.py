@@ -15,6 +15,7 @@ A tile lies in `strips`. The formulas and the bounds of their errors are those o
 import numpy as np
 
 from raytracer.certified import approach, inner
+from raytracer.kernels.alike import shade_alike, shade_alike_unchecked, tabulate
 from raytracer.kernels.bounds import TILE_HEIGHT, TILE_WIDTH
 from raytracer.kernels.compiler import borrowing, inlined, variant
 from raytracer.kernels.lanes import (
@@ -271,33 +272,33 @@ def _first_of(view, bins, tile, x, y):
 def _colour_all(view, bins, tile, coarsest, paints, sheet, out):
     """Colours, and then bytes."""
     align_stack()
-    count = colour_tile(tile, _limits(paints.quick, tile, coarsest), paints.quick, sheet, out)
+    count = colour_tile(view, bins, tile, _limits(paints.quick, tile, coarsest), paints, sheet, out)
     put_tile(tile, sheet, out)
     _keep_for_later(bins, tile, count, sheet)
 
 
 @inlined
-def _flat(tile, limits, quick, sheet, out):
+def _flat(view, bins, tile, limits, paints, sheet, out):
     """One colour wherever anything is hit."""
-    flat, background = sixteen(quick.flat), sixteen(quick.background)
+    flat, background = sixteen(paints.quick.flat), sixteen(paints.quick.background)
     for p in range(np.uint64(0), PIXELS, _SIXTEEN):
         store(sheet.colour, p, blend(load_numbers(sheet.number, p) > 0, flat, background))
     return 0
 
 
-def _shade(tile, limits, quick, sheet, out):
+def _shade(view, bins, tile, limits, paints, sheet, out):
     """`stages.diffuse`; meanwhile the processor fetches where the bytes go.
 
     Returns how many blocks have been listed that have pixels close to another byte.
     """
-    (alike, mixed), close = _sort_blocks(sixteen(quick.background), sheet), 0
+    quick = paints.quick
+    (alike, mixed), done, close = _sort_blocks(sixteen(quick.background), sheet), np.uint64(0), 0
+    if _is_worth_a_table(view, bins, tile, alike, paints, sheet):
+        done, close = alike, shade_alike(tile, alike, quick, sheet, out)
     columns, rows = both(columns_of_block()) - _MIDDLE, both(rows_of_block()) - _MIDDLE_Y
     left, up = np.float32(tile.left + _MIDDLE - quick.middle_x), np.float32(quick.middle_y - tile.top - _MIDDLE_Y)
-    row = tile.top
-    for k in range(np.uint64(0), alike + mixed, np.uint64(2)):
-        if row < tile.bottom:
-            fetch_row(tile, row, out)
-            row += 1
+    for k in range(done, alike + mixed, np.uint64(2)):
+        fetch_row(tile, tile.top + np.int64(k) // 2, out)
         p, q = np.uint64(sheet.blocks[k]), np.uint64(sheet.blocks[k + _ONE])
         if k < alike:
             spread_rows(sheet.table, sheet.firsts[k], sheet.firsts[k + _ONE], sheet.columns)
@@ -313,6 +314,17 @@ def _shade(tile, limits, quick, sheet, out):
             close = list_block(sheet, close, p, bits & 0xFFFF)
             close = list_block(sheet, close, q, bits >> 16)
     return close
+
+
+@inlined
+def _is_worth_a_table(view, bins, tile, alike, paints, sheet):
+    """Whether each sphere of the list is in some blocks of its own, on average; then `alike` has their numbers."""
+    first, end, s = (
+        bins.starts[tile.number],
+        bins.middles[tile.number],
+        _longest(paints.quick, tile) / paints.quick.focus,
+    )
+    return end - first <= np.int64(alike) and tabulate(view, bins, first, end, tile, s, paints, sheet.numbers)
 
 
 @inlined
@@ -450,8 +462,8 @@ _look_at_all = variant(_look, "_look_at_all", inlined, shades=True)
 _draw_shapes = variant(_draw_all, "_draw_shapes", draw=_certain_sphere, look=_look_at_shape)
 _draw_certain = variant(_draw_all, "_draw_certain", draw=_certain_sphere, look=_look_at_all)
 _draw_unchecked = variant(_draw_all, "_draw_unchecked", draw=_unchecked_sphere, look=_look_at_all)
-_shade_certain = variant(_shade, "_shade_certain", inlined, certain=True)
-_shade_unchecked = variant(_shade, "_shade_unchecked", inlined, certain=False)
+_shade_certain = variant(_shade, "_shade_certain", inlined, certain=True, shade_alike=shade_alike)
+_shade_unchecked = variant(_shade, "_shade_unchecked", inlined, certain=False, shade_alike=shade_alike_unchecked)
 _colour_flat = variant(_colour_all, "_colour_flat", colour_tile=_flat)
 _colour_certain = variant(_colour_all, "_colour_certain", colour_tile=_shade_certain)
 _colour_unchecked = variant(_colour_all, "_colour_unchecked", colour_tile=_shade_unchecked)

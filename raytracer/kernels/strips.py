@@ -41,7 +41,9 @@ def list_block(sheet, close, p, bits):
 
 @inlined
 def fetch_row(tile, row, out):
-    """A row of a tile will be written to."""
+    """A row of a tile will be written to, if the tile has it."""
+    if row >= tile.bottom:
+        return
     start = start_of(out, row, tile.left)
     for at in range(np.uint64(0), np.uint64((tile.right - tile.left) * out.pixel_bytes), np.uint64(64)):
         fetch_to_write(out.bytes, start + at)
