@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from raytracer import backend
-from raytracer.arrays import FullPaints, Hits, Paints, Tiles
+from raytracer.arrays import Canvas, FullPaints, Hits, Paints, Tiles
 from raytracer.eye import Eye, count_tests
 from raytracer.image import Depth
 from raytracer.methods import CERTIFIED, Method
@@ -21,7 +21,7 @@ from raytracer.notebook import Picture
 from raytracer.plan import Plan, make_plan
 from raytracer.pool import share
 from raytracer.scene import Camera, Light, Materials, Scene, Spheres
-from raytracer.screen import ALL, SPARE, Pixels, Screen, make_canvas, make_full_paints, make_paints, open_screen
+from raytracer.screen import SPARE, Pixels, Screen, make_canvas, make_full_paints, make_paints, open_screen
 from raytracer.shading import to_byte
 from raytracer.stages import Block, Whole
 
@@ -78,14 +78,18 @@ def draw(
     """`render_scene` for whoever has made the plan already."""
     shape = plan.raster.height, plan.raster.width, 3
     picture = np.empty(shape, plan.depth.kind) if out is None else fitting(out, shape, plan.depth)
-    if plan.painter and make_canvas(picture) is None:
+    canvas = make_canvas(picture) if plan.painter else None
+    if plan.painter and canvas is None:
         picture[...] = draw(plan, threads=threads, progress=progress, cancelled=cancelled)
         return picture
     with open_tracer(plan, threads) as tracer:
         watch = Watch(threads, progress, cancelled, rounds=2 if plan.stage.needs_whole else 1)
-        if plan.painter:
+        if canvas is not None:
             assert isinstance(tracer, Screen)
-            (_paint_whole if plan.stage.needs_whole else _paint)(plan, tracer, picture, watch)
+            if plan.stage.needs_whole:
+                _paint_whole(plan, tracer, canvas, watch)
+            else:
+                _paint(Easel(plan, tracer, paints_of(plan, tracer), picture, canvas), watch)
         else:
             whole = whole_of(plan, tracer, watch)
             share_bands(
@@ -143,17 +147,17 @@ def share_pieces(bands: list[slice], watch: Watch, pieces: int, work: Callable[[
     share([rows for rows in bands for _ in range(pieces)], one, watch.threads, tell)
 
 
-def _paint(plan: Plan, screen: Screen, picture: np.ndarray, watch: Watch) -> None:
-    """A stage that a kernel paints; numpy paints the pixels that float64 was not certain of."""
-    easel = make_easel(plan, screen, picture)
-    bands = screen.bands(plan.shading, joint=True)
+def _paint(easel: Easel, watch: Watch) -> None:
+    """A stage that a kernel paints; numpy paints the pixels that kernels were not certain of."""
+    screen, shading = easel.screen, easel.plan.shading
+    bands = screen.bands(shading, joint=True)
     tiles = {rows.start: screen.tiles_of(rows) for rows in bands}
 
     def paint(rows: slice, worker: int) -> slice:
         easel.paint(tiles[rows.start], worker)
         return rows
 
-    share_pieces(bands, watch, screen.workers(plan.shading), paint)
+    share_pieces(bands, watch, screen.workers(shading), paint)
     easel.finish(*range(len(screen.desks)))
 
 
@@ -165,18 +169,11 @@ class Easel:
     screen: Screen
     paints: Paints | FullPaints
     picture: np.ndarray  # uint8 (rows, width, 3)
-    first_row: int = 0  # of the picture that the rows are of
-    wanted: np.ndarray = field(default_factory=lambda: ALL)  # see `Canvas`
-
-    def on(self, rows: np.ndarray, first_row: int, wanted: np.ndarray) -> Easel:
-        """The same for other rows."""
-        return replace(self, picture=rows, first_row=first_row, wanted=wanted)
+    canvas: Canvas  # its bytes
 
     def paint(self, tiles: Tiles, worker: int) -> None:
         """Paint what is left of some tiles, as `Screen.paint` does; `finish` does the rest."""
-        canvas = make_canvas(self.picture, self.first_row, self.wanted)
-        assert canvas is not None
-        for doubtful in self.screen.paint(self.plan.painter, tiles, worker, self.paints, canvas):
+        for doubtful in self.screen.paint(self.plan.painter, tiles, worker, self.paints, self.canvas):
             self._decide(doubtful, worker)
 
     def finish(self, *workers: int) -> None:
@@ -185,7 +182,7 @@ class Easel:
             self._decide(doubtful, workers[0])
 
     def _decide(self, doubtful: Pixels, worker: int) -> None:
-        hits, places = doubtful.hits(), (doubtful.ys - self.first_row, doubtful.xs)
+        hits, places = doubtful.hits(), (doubtful.ys - self.canvas.first_row, doubtful.xs)
         plan, found = self.plan, self.screen.in_scene(hits)
         if kernel := plan.stage.colours_of:
             self.picture[places] = self.paints.background
@@ -198,14 +195,14 @@ class Easel:
         self.picture[places] = colours_of(plan, block)
 
 
-def make_easel(plan: Plan, screen: Screen, picture: np.ndarray) -> Easel:
-    """What a stage is painted with, and on."""
-    return Easel(plan, screen, (make_full_paints if plan.stage.throws_on else make_paints)(plan, screen), picture)
+def paints_of(plan: Plan, screen: Screen) -> Paints | FullPaints:
+    """What a stage is painted with."""
+    return make_full_paints(plan, screen) if plan.stage.throws_on else make_paints(plan, screen)
 
 
-def _paint_whole(plan: Plan, screen: Screen, picture: np.ndarray, watch: Watch) -> None:
+def _paint_whole(plan: Plan, screen: Screen, canvas: Canvas, watch: Watch) -> None:
     """A stage that a kernel paints from the hits of the whole picture."""
-    paints, canvas, hits = make_paints(plan, screen), make_canvas(picture), screen.room_for_hits()
+    paints, hits = make_paints(plan, screen), screen.room_for_hits()
     width, shape = plan.raster.width, (plan.raster.height, plan.raster.width)
     t, index = (array[:-SPARE].reshape(shape) for array in hits)
 

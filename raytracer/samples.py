@@ -17,7 +17,7 @@ from math import isqrt
 
 import numpy as np
 
-from raytracer.arrays import Hits
+from raytracer.arrays import FullPaints, Hits, Paints
 from raytracer.camera import BAND_PIXELS
 from raytracer.eye import Eye
 from raytracer.image import Depth, check_fits_memory
@@ -29,11 +29,11 @@ from raytracer.render import (
     colours_of,
     draw,
     fitting,
-    make_easel,
     open_tracer,
+    paints_of,
     share_pieces,
 )
-from raytracer.screen import ALL, Screen
+from raytracer.screen import ALL, Screen, make_canvas
 from raytracer.stages import Block, Stage
 
 ADAPTIVE = "adaptive"
@@ -92,11 +92,11 @@ def _draw_means(fine: Plan, side: int, wanted: np.ndarray, picture: np.ndarray, 
     height = _TILE_HEIGHT // side
     strips = [slice(row, min(row + height, len(wanted))) for row in range(0, len(wanted), height)]
     with open_tracer(fine, watch.threads) as tracer:
-        easel = make_easel(fine, tracer, picture) if fine.painter and isinstance(tracer, Screen) else None
+        paints = paints_of(fine, tracer) if fine.painter and isinstance(tracer, Screen) else None
 
         def one(rows: slice, worker: int) -> slice:
             if wanted[rows].any():
-                _draw_strip(fine, tracer, easel, rows, side, wanted[rows], picture[rows], worker)
+                _draw_strip(fine, tracer, paints, rows, side, wanted[rows], picture[rows], worker)
             return rows
 
         share_pieces(strips, watch, 1, one)
@@ -115,25 +115,27 @@ def differing(picture: np.ndarray, depth: Depth = Depth.BYTE) -> np.ndarray:
 
 
 def _draw_strip(
-    fine: Plan, tracer: Eye | Screen, easel: Easel | None, rows: slice, side: int, wanted: np.ndarray,
+    fine: Plan, tracer: Eye | Screen, paints: Paints | FullPaints | None, rows: slice, side: int, wanted: np.ndarray,
     picture: np.ndarray, worker: int,
 ) -> None:  # fmt: skip
     """Draw what is wanted of some rows, bool (rows, width), into those of the picture."""
     large_rows = slice(rows.start * side, rows.stop * side)
-    if easel is None:
+    if paints is None or isinstance(tracer, Eye):
         hits, (ys, xs) = tracer.hits(large_rows, worker), np.nonzero(wanted)
         for few in np.array_split(np.arange(len(ys)), -(-len(ys) * side * side // BAND_PIXELS)):
             picture[ys[few], xs[few]] = _means(fine, large_rows, hits, side, ys[few], xs[few])
         return
-    kernels = easel.screen.kernels
+    kernels = tracer.kernels
     assert (kernels.TILE_WIDTH, kernels.TILE_HEIGHT) == (_TILE_WIDTH, _TILE_HEIGHT)
     large = np.empty((large_rows.stop - large_rows.start, fine.raster.width, 3), np.uint8)
     eights = _any_of(wanted.repeat(side, axis=1), 8)
     some = ALL if wanted.all() else eights.repeat(side, axis=0).astype(np.uint8)
-    part = easel.on(large, large_rows.start, some)
+    canvas = make_canvas(large, large_rows.start, some)
+    assert canvas is not None
+    easel = Easel(fine, tracer, paints, large, canvas)
     for run in _runs(np.asarray(_any_of(eights, _TILE_WIDTH // 8).any(axis=0))):
-        part.paint(easel.screen.tiles_of(large_rows, run), worker)
-    part.finish(worker)
+        easel.paint(tracer.tiles_of(large_rows, run), worker)
+    easel.finish(worker)
     kernels.mean_of_blocks(large, side, wanted, picture)
 
 

@@ -246,7 +246,7 @@ class Screen(NamedTuple):
         What is left of them `doubtful` tells.
         """
         kernel, (scratch, doubts) = getattr(self.kernels, painter), self.desks[worker]
-        tiles = tiles._replace(own=worker % len(self.desks))
+        tiles = Tiles(tiles.taken, tiles.first, tiles.last, worker % len(self.desks))
         while not kernel(self.view, self.slow, self.bins, tiles, scratch, doubts, paints, out):
             yield from self.doubtful(worker)
 

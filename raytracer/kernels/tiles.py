@@ -40,12 +40,14 @@ from raytracer.kernels.quick import (
     put_pixel,
     shade_anew,
 )
+from raytracer.kernels.strips import fetch_row, start_of
 from raytracer.kernels.surfaces import ball_of, diffuse_of_any, diffuse_of_spheres, line_of, normal, ray_of
 from raytracer.kernels.visibility import STRIDE, list_doubts, see_tile, see_tile_unchecked
 from raytracer.shading import to_byte
 from raytracer.twofold import select
 
 # For doubts: those of a tile, then of pixels that have been put off until then, and at the end of those of that tile.
+_ROWS_AHEAD = 6  # that the processor fetches, where it does nothing but to write
 ROOM = 3 * TILE_WIDTH * TILE_HEIGHT + FEW_LATE
 
 
@@ -100,7 +102,7 @@ def _tile(view, bins, number):
 @inlined
 def put_lanes(out, row, x, right, red, green, blue, scratch):
     """Eight pixels from x on, or as many as there are before `right`."""
-    start = np.uint64((row - out.first_row) * out.row_bytes + x * out.pixel_bytes)
+    start = start_of(out, row, x)
     if x + WIDTH <= right and x + WIDTH <= out.columns:
         put_pixels(out.bytes, start, np.uint64(out.pixel_bytes), red, green, blue)
     else:
@@ -121,7 +123,8 @@ def _fill_tile(scratch, tile, paints, out):
     """The background."""
     step, right = np.uint64(out.pixel_bytes), min(tile.right, out.columns)
     for row in range(tile.top, tile.bottom):
-        start, x = np.uint64((row - out.first_row) * out.row_bytes + tile.left * out.pixel_bytes), tile.left
+        fetch_row(tile, row + _ROWS_AHEAD, out)
+        start, x = start_of(out, row, tile.left), tile.left
         while x + ALIKE <= right:
             put_alike(out.bytes, start, step, paints.backdrop)
             x, start = x + ALIKE, start + np.uint64(ALIKE) * step
