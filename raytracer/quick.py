@@ -68,6 +68,7 @@ _BRIGHTEST = 1e4
 _SPARE = 1.1  # for squares of errors
 _ROOT = 2.0**-9  # about √error
 _LEAST = 15 / 16  # 1 − ρ²
+_ROUGHLY = 1.0 + 2.0**-13  # what a rough root may be too small by
 
 
 def error_of(steep: float, rho: Number, blur: Number) -> Number:
@@ -112,7 +113,8 @@ def make_quick(
         strength, darkest = max(map(abs, light.colour)), min(darkest, *light.colour)
         weight, farthest = weight + strength, max(farthest, hypot(*away))
         place = (inner(*axis, *away) for axis in (camera.u, camera.v, camera.w))
-        rows.append([*place, *light.colour, strength, 0.0])
+        halves = (0.5 * channel for channel in light.colour)  # of what twice a cosine is multiplied by
+        rows.append([*place, *halves, strength * _ROUGHLY, 0.0])
     widest = 1.0 + (across + _BEYOND) ** 2 + (up + _BEYOND) ** 2
     steep = 0.5 * (1.0 + widest) ** 2 / (_LEAST * (widest - 1.0 + _LEAST))
     usable = bool(

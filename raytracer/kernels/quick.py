@@ -82,7 +82,8 @@ FEW_LATE = 256  # pixels to be shaded in float64: enough for a while
 _MIDDLE, _MIDDLE_Y = TILE_WIDTH // 2, TILE_HEIGHT // 2
 _LIGHT = np.uint64(8)  # numbers a light
 _ONE, _SIXTEEN = np.uint64(1), np.uint64(SIXTEEN)
-_HALF, _UNIT, _ZERO, _STEP = np.float32(0.5), np.float32(1.0), np.float32(0.0), np.float32(SIDE)
+_ZERO, _HALF, _UNIT, _THREE = np.float32(0.0), np.float32(0.5), np.float32(1.0), np.float32(3.0)
+_STEP = np.float32(SIDE)
 _BORDER = np.float32(0.5 - 5.0 / ONE_BYTE)  # of two bytes, but for what roundings at the end add
 
 
@@ -164,7 +165,7 @@ def _look(view, bins, at, row, tile, s, paints, sheet):
     store_halves(batch, 80, depth * m)
     store_halves(batch, 88, depth * u * pixel)
     store_halves(batch, 96, depth * v * -pixel)
-    store_halves(batch, 104, radius)
+    store_halves(batch, 104, -0.5 * radius)
     store_halves(batch, 112, 4.0 * error * m)
     if shades:
         away, scale = abs(middle_x) + abs(middle_y), 255.0 * blur
@@ -184,7 +185,7 @@ def _draw(entry, number, j, tie, sheet):
     columns, rows = columns_of_block() - b[eight + j], rows_of_block() - b[np.uint64(24) + j]
     middle, e1, e2, xx = b[np.uint64(32) + j], b[np.uint64(40) + j], b[np.uint64(48) + j], b[np.uint64(56) + j]
     xy, yy, k0, k1 = b[np.uint64(64) + j], b[np.uint64(72) + j], b[np.uint64(80) + j], b[np.uint64(88) + j]
-    k2, radius, rim = b[np.uint64(96) + j], b[np.uint64(104) + j], b[np.uint64(112) + j]
+    k2, half, rim = b[np.uint64(96) + j], b[np.uint64(104) + j], b[np.uint64(112) + j]
     own = sixteen(number)
     left, right = start // SIDE, (stop + SIDE - 1) // SIDE
     lines = (low - high + SIDE - 1) // SIDE
@@ -197,8 +198,8 @@ def _draw(entry, number, j, tie, sheet):
         for _ in range(right - left):
             x, best = columns + shift, load(sheet.depth, p)
             disc = times_plus(x, times_plus(x, -xx, slope), of_row)
-            root = _root(disc, rough_inverse_root(disc))
-            k = times_plus(root, -radius, times_plus(x, spread(k1), k_row))
+            root = _twice_root(disc, rough_inverse_root(disc))
+            k = times_plus(root, half, times_plus(x, spread(k1), k_row))
             wins = k < best
             store(sheet.depth, p, blend(wins, k, best))
             store(sheet.number, p, blend(wins, own, load_numbers(sheet.number, p)))
@@ -218,10 +219,10 @@ def _doubt(sheet, p, bits):
 
 
 @inlined
-def _root(x, rough):
-    """√x from a rough 1 / √x."""
+def _twice_root(x, rough):
+    """2√x from a rough 1 / √x."""
     root = x * rough
-    return times_plus(times_plus(-root, root, x), rough * _HALF, root)
+    return root * times_plus(-root, rough, _THREE)
 
 
 @borrowing
@@ -380,22 +381,21 @@ def _light(quick, sheet, x, y, u, v, limits):
     disc = times_plus(along, along, a * (size2 - times_plus(du, du, dv * dv)))
     rough, over = rough_inverse_root(disc), rough_inverse(a)
     over = times_plus(times_plus(-a, over, _UNIT), over, over)
-    tau = -(along + _root(disc, rough)) * over
-    t, nu, nv, nw = times_plus(unit, tau, unit), times_plus(tau, u, du), times_plus(tau, v, dv), tau * focus
+    tau = times_plus(_twice_root(disc, rough), _HALF, along) * over  # −τ
+    t, nu, nv, nw = times_plus(-tau, unit, unit), times_plus(-tau, u, du), times_plus(-tau, v, dv), tau * focus
     pu, pv, pw = t * u, t * v, t * focus
     (longest, rim, flat), light, nothing = limits, quick.lights, both(spread(_ZERO))
     red, green, blue, nearness = nothing, nothing, nothing, nothing
     for i in range(np.uint64(0), np.uint64(len(light)), _LIGHT):
         tu, tv, tw = light[i] - pu, light[i + _ONE] - pv, light[i + np.uint64(2)] + pw
-        facing = times_plus(nu, tu, times_plus(nv, tv, -(nw * tw)))
+        facing = times_plus(nu, tu, times_plus(nv, tv, nw * tw))
         square = times_plus(tu, tu, times_plus(tv, tv, tw * tw))
-        length = rough_inverse_root(square)
-        length = times_plus(times_plus(-(square * length), length, _UNIT), length * _HALF, length)
-        shine = greater(facing, _ZERO) * length
+        rough_length = rough_inverse_root(square)
+        shine = greater(facing, _ZERO) * rough_length * times_plus(-(square * rough_length), rough_length, _THREE)
         red = times_plus(shine, light[i + np.uint64(3)], red)
         green = times_plus(shine, light[i + np.uint64(4)], green)
         blue = times_plus(shine, light[i + np.uint64(5)], blue)
-        nearness = times_plus(length, light[i + np.uint64(6)], nearness)
+        nearness = times_plus(rough_length, light[i + np.uint64(6)], nearness)
     off = times_plus(rough * size, longest, flat) * coarse
     error = times_plus(nearness, np.float32(quick.far), np.float32(quick.rounding))
     error = times_plus(times_plus(nearness, unit * size, np.float32(quick.weight)), off, error)
