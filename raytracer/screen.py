@@ -442,6 +442,7 @@ def _quick_scratch(workspace: Workspace, kernels: ModuleType, worker: int) -> Qu
         colour=depth.view(np.int32),
         number=array(pixels, np.int32, "number"),
         doubt=array(pixels // 4, np.int32, "doubt"),
+        doubtful=array(1, np.int64, "doubtful"),
         table=array(8 * (kernels.MOST + 16), np.float32, "table"),
         batch=array(160, np.float32, "batch"),
         numbers=array(_NUMBERS, np.float32, "numbers"),

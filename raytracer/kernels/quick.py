@@ -83,7 +83,7 @@ _MIDDLE, _MIDDLE_Y = TILE_WIDTH // 2, TILE_HEIGHT // 2
 _LIGHT = np.uint64(8)  # numbers a light
 _ONE, _SIXTEEN = np.uint64(1), np.uint64(SIXTEEN)
 _ZERO, _HALF, _UNIT, _THREE = np.float32(0.0), np.float32(0.5), np.float32(1.0), np.float32(3.0)
-_STEP = np.float32(SIDE)
+_STEP, _LARGEST_K = np.float32(SIDE), np.float32(1.3)  # of a sphere, by that of its middle
 _BORDER = np.float32(0.5 - 5.0 / ONE_BYTE)  # of two bytes, but for what roundings at the end add
 
 
@@ -96,9 +96,9 @@ def _paint_tile(view, slow, bins, tile, scratch, doubts, paints, out):
         return False
     coarsest = draw_all(view, bins, first, end, tile, paints, sheet)
     if coarsest < 0.0:
-        sheet.doubt[:] = 0
+        sheet.doubt[:], sheet.doubtful[0] = 0, 0
         return False
-    if certain:
+    if certain and sheet.doubtful[0]:
         _decide(view, bins, tile, sheet, doubts)
     colour_all(view, bins, tile, coarsest, paints, sheet, out)
     return True
@@ -186,7 +186,7 @@ def _draw(entry, number, j, tie, sheet):
     middle, e1, e2, xx = b[np.uint64(32) + j], b[np.uint64(40) + j], b[np.uint64(48) + j], b[np.uint64(56) + j]
     xy, yy, k0, k1 = b[np.uint64(64) + j], b[np.uint64(72) + j], b[np.uint64(80) + j], b[np.uint64(88) + j]
     k2, half, rim = b[np.uint64(96) + j], b[np.uint64(104) + j], b[np.uint64(112) + j]
-    own = sixteen(number)
+    own, close = sixteen(number), _LARGEST_K * k0 * tie
     left, right = start // SIDE, (stop + SIDE - 1) // SIDE
     lines = (low - high + SIDE - 1) // SIDE
     top = min(high, TILE_HEIGHT - SIDE * lines)
@@ -204,7 +204,7 @@ def _draw(entry, number, j, tie, sheet):
             store(sheet.depth, p, blend(wins, k, best))
             store(sheet.number, p, blend(wins, own, load_numbers(sheet.number, p)))
             if certain:
-                unsure = (abs(disc) <= rim) | (abs(k - best) <= k * tie)
+                unsure = (abs(disc) <= rim) | (abs(k - best) <= close)
                 if any_of(unsure):
                     _doubt(sheet, p, bits_of(unsure))
             shift += _STEP
@@ -214,6 +214,7 @@ def _draw(entry, number, j, tie, sheet):
 @inlined
 def _doubt(sheet, p, bits):
     """Mark sixteen pixels, by the rows of their strip."""
+    sheet.doubtful[0] = 1
     for row in range(np.uint64(SIDE)):
         sheet.doubt[p // np.uint64(SIDE) + row] |= bits >> SIDE * row & (1 << SIDE) - 1
 
@@ -228,7 +229,7 @@ def _twice_root(x, rough):
 @borrowing
 def _decide(view, bins, tile, sheet, doubts):
     """Decide in float64 what single precision could not tell, and list what float64 cannot tell either."""
-    width = len(view.across) - WIDTH
+    width, sheet.doubtful[0] = len(view.across) - WIDTH, 0
     for some in range(np.uint64(0), np.uint64(len(sheet.doubt)), _SIXTEEN):
         rows = np.int32(bits_of(load_numbers(sheet.doubt, some) > 0))
         while rows:
