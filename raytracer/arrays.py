@@ -320,7 +320,7 @@ class QuickScratch(NamedTuple):
     firsts: np.ndarray  # int32, which sphere that is
     mixed: np.ndarray  # int32, the others
     columns: np.ndarray  # float32 (8 · 32,), the columns of the table for the pixels of two blocks
-    close: np.ndarray  # int32, the first pixel of blocks that have pixels close to another byte
+    close: np.ndarray  # int32, which pairs of `blocks` have pixels close to another byte
     bits: np.ndarray  # int32, a bit for each of those
     late: np.ndarray  # int64 (1,), how many pixels are to be shaded in float64
     late_columns: np.ndarray  # int32: those

@@ -28,7 +28,7 @@ from raytracer.kernels.sixteen import (
     times_plus,
     two,
 )
-from raytracer.kernels.strips import fetch_row, list_block, pixel_of
+from raytracer.kernels.strips import fetch_row, list_pair, pixel_of
 from raytracer.quick import ONE_BYTE, U
 from raytracer.twofold import select
 
@@ -114,7 +114,7 @@ def tabulate(view, bins, first, end, tile, s, paints, numbers):
 def _shade(tile, count, quick, sheet, out):
     """`stages.diffuse` of so many blocks; meanwhile the processor fetches where the bytes go.
 
-    Returns how many have been listed that have pixels close to another byte.
+    Returns how many pairs have been listed that have pixels close to another byte.
     """
     numbers, close, lights = sheet.numbers, 0, np.uint64(len(quick.lights)) // _EIGHT
     columns, rows = both(columns_of_block()), both(rows_of_block())
@@ -145,8 +145,7 @@ def _shade(tile, count, quick, sheet, out):
             apart = larger_size(larger_size(rest(red), rest(green)), rest(blue))
             limit = times_plus(-rough, _number(numbers, at, _RIM_ERROR), _number(numbers, at, _SURE))
             bits = bits_of(hit & ~((apart < limit) & (disc > _number(numbers, at, _RIM))))
-            close = list_block(sheet, close, p, bits & 0xFFFF)
-            close = list_block(sheet, close, q, bits >> 16)
+            close = list_pair(sheet, close, k, bits)
     return close
 
 

@@ -65,7 +65,7 @@ from raytracer.kernels.strips import (
     STRIP,
     fetch_row,
     is_in,
-    list_block,
+    list_pair,
     pixel_of,
     put_pixel,
     put_tile,
@@ -291,7 +291,7 @@ def _flat(view, bins, tile, limits, paints, sheet, out):
 def _shade(view, bins, tile, limits, paints, sheet, out):
     """`stages.diffuse`; meanwhile the processor fetches where the bytes go.
 
-    Returns how many blocks have been listed that have pixels close to another byte.
+    Returns how many pairs of blocks have been listed that have pixels close to another byte.
     """
     quick = paints.quick
     (alike, mixed), done, close = _sort_blocks(sixteen(quick.background), sheet), np.uint64(0), 0
@@ -313,8 +313,7 @@ def _shade(view, bins, tile, limits, paints, sheet, out):
         store_pair(sheet.colour, p, q, blend(hit, colour, quick.background))
         if certain:
             bits = bits_of(hit & ~sure)
-            close = list_block(sheet, close, p, bits & 0xFFFF)
-            close = list_block(sheet, close, q, bits >> 16)
+            close = list_pair(sheet, close, k, bits)
     return close
 
 
@@ -408,13 +407,14 @@ def _light(quick, sheet, x, y, u, v, limits):
 
 @borrowing
 def _keep_for_later(bins, tile, count, sheet):
-    """List the pixels of a tile that are to be shaded in float64, from so many blocks."""
+    """List the pixels of a tile that are to be shaded in float64, from so many pairs of blocks."""
     late, last = sheet.late[0], bins.starts[tile.number] - 1
     for k in range(count):
         bits = sheet.bits[k]
         while bits:
-            p = sheet.close[k] + lowest_bit(bits)
-            bits &= bits - 1
+            bit = lowest_bit(bits)
+            p = sheet.blocks[sheet.close[k] + bit // SIXTEEN] + bit % SIXTEEN
+            bits = np.int32(bits & (bits - 1))  # of which the highest is the sign
             x, y = pixel_of(p)
             if is_in(tile, x, y):
                 sheet.late_columns[late], sheet.late_rows[late] = tile.left + x, tile.top + y

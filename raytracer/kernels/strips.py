@@ -33,10 +33,10 @@ def is_in(tile, x, y):
 
 
 @inlined
-def list_block(sheet, close, p, bits):
-    """List a block, if it has any bits; returns how many are listed then. Without a branch, which nobody could tell."""
-    sheet.close[close], sheet.bits[close] = p, bits
-    return close + (bits > 0)
+def list_pair(sheet, close, k, bits):
+    """List blocks k and k + 1, if there are any bits; returns how many are listed then. Nobody could tell a branch."""
+    sheet.close[close], sheet.bits[close] = k, bits
+    return close + (bits != 0)
 
 
 @inlined
