@@ -18,21 +18,21 @@ of V. ε³ has (5V⁴ − 6V² + 1)/2, of which V⁴ is 2V³ − 1.25V² + V/4 �
 has less than 0.42, and all others less than 1. So for ε ≤ 1/32 a cubic is within ε³(0.0196 + 0.46ε); it is below 0 for
 V below 0, as the cosine is.
 
-**Errors**, with u = 2⁻²⁴, s², t² and |δ| ≤ σw, σ = 1.05s, of `quick`; ρ is the sphere's radius by its depth, and
-p = (|X| + |Y|) / √B. Middles are split into whole numbers and rests, so δ is off by ηw, η = u(3.6/w + 1.5σ). All other
-numbers of a sphere are rounded once, and each product and sum. |E| is at most we, e = pσ + 1.04ρ, and off by
-w(pη + 4eu); h by w²(2.05ση + 3σ²u), so E² + h by w²·2c₁, and R, with cos = R/w and cos² > 16c₁, by
-w(1.034c₁/cos + 2.7u(e + 1)), where
+**Errors**, with u = 2⁻²⁴, s², t² and |δ| ≤ σw, σ = 1.05s, of `quick`; ρ is the sphere's radius by its depth, b = 1 + ρ,
+and p = (|X| + |Y|) / √B. A middle is split into a whole number and the rest, which is taken off last, so δ is off by
+ηw, η = u(0.71/w + σ). All other numbers of a sphere are rounded once, each product and each sum. |E| is at most we,
+e = pσ + 1.04ρ, and off by w(pη + 4eu); h by w²(2.06ση + (2 + 2σ²)u), so E² + h by w²·2c₁, where
 
-    c₁ = η(ep + 1.03σ) + u(4.5e² + 1.5σ² + ½)
+    c₁ = η(ep + 1.03σ) + u(4.5e² + σ² + 2)
 
-and what float64 leaves (see `quick`). √(B / D·D) is at most 1 + ρ, as the angle between D and C is at most that whose
-sine is ρ; |τD| ≤ Tw, T = 1 + 1.05t. So the dividend, by w√B, is off by 1.034c₁/cos + η(p + 2.2ρσ) +
-u(12.7e + 5.7 + 4.2ρσ²), the divisor by u(2(1+ρ)² + 1 + 10eρ(1+ρ) + 4ρ²σ²) + 2.05ηρ((1+ρ)p + ρσ) of itself, the quotient
-by 2.2u more. λ·δ is off by η + 3σu, and |κτ| ≤ 1.04(1+ρ)T. So V is off by c₀ + 1.034(1+ρ)c₁/cos,
+and what float64 leaves (see `quick`). √(B / D·D) is at most b, and √(D·D / B) at most 1.04b, as the angle between D and
+C is at most that whose sine is ρ; |τD| ≤ Tw, T = 1 + 1.05t. So with cos = R/w and cos² > 16c₁, R is off by
+w(1.034c₁/cos + 3bu). The dividend is off by w√B times 1.034c₁/cos + η(p + 2.2ρσ) + u(4e + 3b + 4.3bT + ρ(2.1 + 5.3σ²)),
+the divisor by u(2b² + 1 + 12eρb + ρ²(2 + 3σ²)) + ηρ(2bp + 2.1ρσ) of itself, the quotient by 3.2u more. λ·δ is off by
+η + 3σu, and |κτ| ≤ 1.04bT. So V is off by c₀ + 1.034bc₁/cos,
 
-    c₀ = (1 + Tρ)(η + 4σu) + (1+ρ)(η(p + 2.2ρσ) + u(12.7e + 5.7 + 4.2ρσ²)) + u(2.1(1+ρ)T + 1)
-         + T(u(2(1+ρ)² + 3.2 + 10eρ(1+ρ) + 4ρ²σ²) + 2.05ηρ((1+ρ)p + ρσ))
+    c₀ = (1 + Tρ)(η + 5σu) + b(η(p + 2.2ρσ) + u(4e + 3b + 4.3bT + ρ(2.1 + 5.3σ²)))
+         + T(u(2b² + 4.2 + 12eρb + ρ²(2 + 3σ²)) + ηρ(2bp + 2.1ρσ)) + u(2.1bT + 1.1)
 
 and the cosine by (1 + 3ε) times that and 4.3u, and by what the cubic lacks.
 """
@@ -51,22 +51,22 @@ _SPARE = 1.05  # for squares of errors
 def rim_error(sigma: Number, p: Number, rho: Number, blur: Number) -> Number:
     """c₁ but for what float64 leaves, for σ, p, ρ and 1 / w."""
     eta, e = _off(sigma, blur), p * sigma + 1.04 * rho
-    return _SPARE * (eta * (e * p + 1.03 * sigma) + U * (e * e * 4.5 + (1.5 * sigma * sigma + 0.5)))
+    return _SPARE * (eta * (e * p + 1.03 * sigma) + U * (e * e * 4.5 + (sigma * sigma + 2.0)))
 
 
 def least_error(sigma: Number, tilt: Number, p: Number, rho: Number, blur: Number) -> Number:
     """c₀, for σ, T, p, ρ and 1 / w."""
-    eta, e, b, rho_sigma = _off(sigma, blur), p * sigma + 1.04 * rho, rho + 1.0, rho * sigma
-    first = (rho * tilt + 1.0) * (eta + 4.0 * sigma * U)
-    dividend = b * (eta * (p + 2.2 * rho_sigma) + U * (e * 12.7 + 4.2 * sigma * rho_sigma + 5.7))
-    divisor = U * (2.0 * b * b + 10.0 * e * rho * b + 4.0 * rho_sigma * rho_sigma + 3.2)
-    divisor = divisor + 2.05 * eta * rho * (b * p + rho_sigma)
-    return _SPARE * (first + dividend + tilt * divisor + U * (2.1 * tilt * b + 1.0))
+    eta, e, b, sigma2 = _off(sigma, blur), p * sigma + 1.04 * rho, rho + 1.0, sigma * sigma
+    first = (rho * tilt + 1.0) * (eta + 5.0 * sigma * U) + U * (2.1 * tilt * b + 1.1)
+    dividend = U * (4.0 * e + (3.0 + 4.3 * tilt) * b + rho * (2.1 + 5.3 * sigma2)) + eta * (p + 2.2 * sigma * rho)
+    divisor = U * (2.0 * b * b + 4.2 + rho * (12.0 * e * b + rho * (2.0 + 3.0 * sigma2)))
+    divisor = divisor + eta * rho * (2.0 * b * p + 2.1 * sigma * rho)
+    return _SPARE * (first + b * dividend + tilt * divisor)
 
 
 def _off(sigma: Number, blur: Number) -> Number:
     """η."""
-    return U * (3.6 * blur + 1.5 * sigma)
+    return U * (0.71 * blur + sigma)
 
 
 def bounds_of(s: Number) -> tuple[Number, Number]:

@@ -104,7 +104,7 @@ def tabulate(view, bins, first, end, tile, s, paints, numbers):
         brightest = select(red > green, red, green)
         brightest = 255.0 * select(brightest > blue, brightest, blue)
         _put(numbers, batch, _RIM_ERROR, brightest * weight * (1.035 * (rho + 1.0)) * rim * size)
-        spare = (5.0 + len(lights)) / ONE_BYTE
+        spare = (5.0 + 2.0 * len(lights)) / ONE_BYTE
         _put(numbers, batch, _SURE, (0.5 - spare) - brightest * (weight * least + error))
         _put(numbers, batch, _RIM, 18.0 * rim * size2)
         batch += of_a_batch
@@ -123,10 +123,9 @@ def _shade(tile, count, quick, sheet, out):
         p, q = np.uint64(sheet.blocks[k]), np.uint64(sheet.blocks[k + _ONE])
         at = _place_of(sheet.firsts[k], lights), _place_of(sheet.firsts[k + _ONE], lights)
         (column, row), (column2, row2) = pixel_of(np.int64(p)), pixel_of(np.int64(q))
-        x = columns - _number(numbers, at, _X_REST)
-        y = rows - _number(numbers, at, _Y_REST)
-        x = x + (two(np.float32(column), np.float32(column2)) - _number(numbers, at, _X_WHOLE))
-        y = y + (two(np.float32(row), np.float32(row2)) - _number(numbers, at, _Y_WHOLE))
+        x = columns + (two(np.float32(column), np.float32(column2)) - _number(numbers, at, _X_WHOLE))
+        y = rows + (two(np.float32(row), np.float32(row2)) - _number(numbers, at, _Y_WHOLE))
+        x, y = x - _number(numbers, at, _X_REST), y - _number(numbers, at, _Y_REST)
         e = times_plus(y, _number(numbers, at, _Y_SLOPE), _number(numbers, at, _START))
         e = times_plus(x, _number(numbers, at, _X_SLOPE), e)
         h = times_plus(-x, x, times_plus(-y, y, _number(numbers, at, _SIZE2)))
