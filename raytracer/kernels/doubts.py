@@ -1,6 +1,6 @@
 """Doubtful pixels of spheres, decided in two-fold float64 and painted by whoever has found them.
 
-doubts ── _nearest ──> t, sphere ── paint_hits ──> bytes of the picture
+doubts ── _nearest ──> t, sphere ── _shade_hits ──> bytes of the picture
        └─ what two-fold float64 cannot tell either ──> doubts, for `settle`
 """
 
@@ -31,16 +31,15 @@ def _decide_doubts(view, slow, bins, paints, scratch, doubts, out):
         if unsure or bins.middles[tile] < bins.starts[tile + 1]:
             doubts[0] += 1
             doubts[doubts[0]] = doubts[k]
-        elif sphere < 0:
-            put_pixel(out, start_of(out, row, column), paints.quick.background)
+        elif sphere < 0 or not shades:
+            put_pixel(out, start_of(out, row, column), paints.quick.background if sphere < 0 else paints.quick.flat)
         else:
             scratch.k[hits], sheet.spheres[hits] = t, sphere
             sheet.late_rows[hits], sheet.late_columns[hits] = row, column
             hits += np.uint64(1)
-            if hits == WIDTH:
-                paint_hits(view, paints, scratch, hits, out)
-                hits = np.uint64(0)
-    paint_hits(view, paints, scratch, hits, out)
+        if shades and hits and (hits == WIDTH or k == count):
+            _shade_hits(view, paints, scratch, hits, out)
+            hits = np.uint64(0)
 
 
 @borrowing
@@ -60,17 +59,8 @@ def _nearest(view, bins, quick, tile, row, column):
 
 
 @inlined
-def _flat_hits(view, paints, scratch, count, out):
-    for k in range(count):
-        sheet = scratch.quick
-        put_pixel(out, start_of(out, sheet.late_rows[k], sheet.late_columns[k]), paints.quick.flat)
-
-
-@inlined
-def _diffuse_hits(view, paints, scratch, count, out):
-    """As `surfaces.diffuse_of`; of up to eight."""
-    if not count:
-        return
+def _shade_hits(view, paints, scratch, count, out):
+    """Paint up to eight hits, as `surfaces.diffuse_of` shades them."""
     sheet = scratch.quick
     for spare in range(count, np.uint64(WIDTH)):
         scratch.k[spare], sheet.spheres[spare] = scratch.k[0], sheet.spheres[0]
@@ -84,8 +74,8 @@ def _diffuse_hits(view, paints, scratch, count, out):
         put_pixel(out, start_of(out, sheet.late_rows[k], sheet.late_columns[k]), sheet.spheres[k])
 
 
-decide_flat = variant(_decide_doubts, "decide_flat", paint_hits=_flat_hits)
-decide_diffuse = variant(_decide_doubts, "decide_diffuse", paint_hits=_diffuse_hits)
+decide_flat = variant(_decide_doubts, "decide_flat", shades=False)
+decide_diffuse = variant(_decide_doubts, "decide_diffuse", shades=True)
 
 
 @inlined

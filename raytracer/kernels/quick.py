@@ -295,7 +295,9 @@ def _shade(view, bins, tile, limits, paints, sheet, out):
     """
     quick = paints.quick
     (alike, mixed), done, close = _sort_blocks(sixteen(quick.background), sheet), np.uint64(0), 0
-    if _is_worth_a_table(view, bins, tile, alike, paints, sheet):
+    first, end, s = bins.starts[tile.number], bins.middles[tile.number], _longest(quick, tile) / quick.focus
+    worth = end - first <= np.int64(alike)  # else the numbers of all spheres cost more than they save
+    if worth and tabulate(view, bins, first, end, tile, s, paints, sheet.numbers):
         done, close = alike, shade_alike(tile, alike, quick, sheet, out)
     columns, rows = both(columns_of_block()) - _MIDDLE, both(rows_of_block()) - _MIDDLE_Y
     left, up = np.float32(tile.left + _MIDDLE - quick.middle_x), np.float32(quick.middle_y - tile.top - _MIDDLE_Y)
@@ -315,17 +317,6 @@ def _shade(view, bins, tile, limits, paints, sheet, out):
             bits = bits_of(hit & ~sure)
             close = list_pair(sheet, close, k, bits)
     return close
-
-
-@inlined
-def _is_worth_a_table(view, bins, tile, alike, paints, sheet):
-    """Whether each sphere of the list is in some blocks of its own, on average; then `alike` has their numbers."""
-    first, end, s = (
-        bins.starts[tile.number],
-        bins.middles[tile.number],
-        _longest(paints.quick, tile) / paints.quick.focus,
-    )
-    return end - first <= np.int64(alike) and tabulate(view, bins, first, end, tile, s, paints, sheet.numbers)
 
 
 @inlined
