@@ -34,7 +34,7 @@ from raytracer.twofold import select
 
 _X_REST, _X_WHOLE, _Y_REST, _Y_WHOLE, _X_SLOPE, _Y_SLOPE, _START, _SIZE2 = range(8)
 _B, _TWICE_ROOT_B, _ROOT_B, _RIM_ERROR, _SURE, _RIM, _OF_A_SPHERE = range(8, 15)
-_ACROSS, _DOWN, _ALONG, _CUBIC, _RED, _GREEN, _BLUE, _OF_A_LIGHT = 0, 1, 2, 3, 7, 8, 9, 10
+_ACROSS, _DOWN, _ALONG, _CUBIC, _COLOUR, _OF_A_LIGHT = 0, 1, 2, 3, 7, 10
 _EIGHT, _ONE = np.uint64(WIDTH), np.uint64(1)
 _HALF, _UNIT, _ZERO, _THREE = np.float32(0.5), np.float32(1.0), np.float32(0.0), np.float32(3.0)
 
@@ -48,11 +48,11 @@ def _put(table, batch, column, lanes):
 @borrowing
 def tabulate(view, bins, first, end, tile, s, paints, numbers):
     """Work out the numbers of all spheres of a list; returns whether there is room, and lights are far enough away."""
-    quick, lights, (sigma, tilt) = paints.quick, paints.lights, bounds_of(s)
-    of_a_batch = np.uint64(_OF_A_SPHERE + _OF_A_LIGHT * len(lights))
+    quick, (sigma, tilt) = paints.quick, bounds_of(s)
+    of_a_batch = np.uint64(_OF_A_SPHERE + _OF_A_LIGHT * len(paints.lights))
     if np.uint64(end - first + WIDTH) * of_a_batch > np.uint64(len(numbers)):
         return False
-    batch, far = np.uint64(0), spread(0.0)
+    batch, nearest = np.uint64(0), spread(0.0)
     for at in range(np.uint64(first), np.uint64(end), _EIGHT):
         where = load_low(bins.entries, at)
         x, y, z, radius = gather_rows(view.balls, where)
@@ -79,36 +79,55 @@ def tabulate(view, bins, first, end, tile, s, paints, numbers):
         _put(numbers, batch, _B, b)
         _put(numbers, batch, _TWICE_ROOT_B, root + root)
         _put(numbers, batch, _ROOT_B, root)
-        p, f = (abs(across) + abs(down)) * over_root, quick.focus * blur
-        rim = rim_error(sigma, p, rho, blur) + (2.0**-53 * quick.widest) * f * f
-        least = least_error(sigma, tilt, p, rho, blur)
         red, green, blue, _ = gather_rows(paints.colours, gather(view.material, where))
-        weight, error, light = spread(0.0), spread((2.0 * U) * quick.weight), batch + np.uint64(_OF_A_SPHERE)
-        for i in range(len(lights)):
-            tx, ty, tz = lights[i, 0] - x, lights[i, 1] - y, lights[i, 2] - z
-            nearness = 1.0 / np.sqrt(inner(tx, ty, tz, tx, ty, tz))
-            epsilon, by_size = radius * nearness, nearness * blur
-            far = select(far > epsilon, far, epsilon)
-            _put(numbers, light, _ACROSS, inner(quick.u[0], quick.u[1], quick.u[2], tx, ty, tz) * by_size)
-            _put(numbers, light, _DOWN, -inner(quick.v[0], quick.v[1], quick.v[2], tx, ty, tz) * by_size)
-            _put(numbers, light, _ALONG, inner(x, y, z, tx, ty, tz) * nearness * (pixels * blur))
-            for k, coefficient in enumerate(cubic_of(epsilon)):
-                _put(numbers, light, _CUBIC + k, coefficient)
-            _put(numbers, light, _RED, red * (255.0 * lights[i, 3]))
-            _put(numbers, light, _GREEN, green * (255.0 * lights[i, 4]))
-            _put(numbers, light, _BLUE, blue * (255.0 * lights[i, 5]))
-            strength, slope = max(lights[i, 3], lights[i, 4], lights[i, 5]), epsilon * 3.0 + 1.0
-            weight = weight + strength * slope
-            error = error + strength * (slope * (4.3 * U) + cubic_error(epsilon) + nearness * (quick.far * 2.0**-20))
-            light += np.uint64(_OF_A_LIGHT)
-        brightest = select(red > green, red, green)
-        brightest = 255.0 * select(brightest > blue, brightest, blue)
+        colour, light = (255.0 * red, 255.0 * green, 255.0 * blue), batch + np.uint64(_OF_A_SPHERE)
+        weight, error, near = _tabulate_lights(quick, paints.lights, numbers, light, x, y, z, radius, blur, colour)
+        nearest = _larger(nearest, near)
+        brightest, p, f = (
+            _larger(_larger(*colour[:2]), colour[2]),
+            (abs(across) + abs(down)) * over_root,
+            quick.focus * blur,
+        )
+        rim = rim_error(sigma, p, rho, blur) + (2.0**-53 * quick.widest) * f * f
+        spare = (5.0 + 2.0 * len(paints.lights)) / ONE_BYTE
+        least = brightest * (weight * least_error(sigma, tilt, p, rho, blur) + error)
         _put(numbers, batch, _RIM_ERROR, brightest * weight * (1.035 * (rho + 1.0)) * rim * size)
-        spare = (5.0 + 2.0 * len(lights)) / ONE_BYTE
-        _put(numbers, batch, _SURE, (0.5 - spare) - brightest * (weight * least + error))
+        _put(numbers, batch, _SURE, (0.5 - spare) - least)
         _put(numbers, batch, _RIM, 18.0 * rim * size2)
         batch += of_a_batch
-    return bits_of(far < 1.0 / NEAREST_LIGHT) == (1 << WIDTH) - 1
+    return bits_of(nearest < 1.0 / NEAREST_LIGHT) == (1 << WIDTH) - 1
+
+
+@inlined
+def _tabulate_lights(quick, lights, numbers, light, x, y, z, radius, blur, colour):
+    """The numbers of eight spheres that are another for each light.
+
+    Returns the sums of the lights' strengths, times how much an error of V matters, and of their own errors; and ε of
+    the nearest light.
+    """
+    weight, error, nearest = spread(0.0), spread((2.0 * U) * quick.weight), spread(0.0)
+    for i in range(len(lights)):
+        tx, ty, tz = lights[i, 0] - x, lights[i, 1] - y, lights[i, 2] - z
+        nearness = 1.0 / np.sqrt(inner(tx, ty, tz, tx, ty, tz))
+        epsilon, by_size = radius * nearness, nearness * blur
+        nearest = _larger(nearest, epsilon)
+        _put(numbers, light, _ACROSS, inner(quick.u[0], quick.u[1], quick.u[2], tx, ty, tz) * by_size)
+        _put(numbers, light, _DOWN, -inner(quick.v[0], quick.v[1], quick.v[2], tx, ty, tz) * by_size)
+        _put(numbers, light, _ALONG, inner(x, y, z, tx, ty, tz) * nearness / radius)
+        for k, coefficient in enumerate(cubic_of(epsilon)):
+            _put(numbers, light, _CUBIC + k, coefficient)
+        for channel in range(3):
+            _put(numbers, light, _COLOUR + channel, colour[channel] * lights[i, 3 + channel])
+        strength, slope = max(lights[i, 3], lights[i, 4], lights[i, 5]), epsilon * 3.0 + 1.0
+        weight = weight + strength * slope
+        error = error + strength * (slope * (4.3 * U) + cubic_error(epsilon) + nearness * (quick.far * 2.0**-20))
+        light += np.uint64(_OF_A_LIGHT)
+    return weight, error, nearest
+
+
+@inlined
+def _larger(a, b):
+    return select(a > b, a, b)
 
 
 def _shade(tile, count, quick, sheet, out):
@@ -157,13 +176,13 @@ def _lights(numbers, at, lights, x, y, tau):
         light = np.uint64(_OF_A_SPHERE) + i * np.uint64(_OF_A_LIGHT)
         slope = times_plus(x, _number(numbers, at, light), y * _number(numbers, at, light + np.uint64(_DOWN)))
         v = times_plus(slope, along, -(tau * _number(numbers, at, light + np.uint64(_ALONG))))
-        cubic = light + np.uint64(_CUBIC)
+        cubic, colour = light + np.uint64(_CUBIC), light + np.uint64(_COLOUR)
         shine = times_plus(v, _number(numbers, at, cubic + np.uint64(3)), _number(numbers, at, cubic + np.uint64(2)))
         shine = times_plus(times_plus(v, shine, _number(numbers, at, cubic + _ONE)), v, _number(numbers, at, cubic))
         shine = greater(shine, _ZERO)
-        red = times_plus(shine, _number(numbers, at, light + np.uint64(_RED)), red)
-        green = times_plus(shine, _number(numbers, at, light + np.uint64(_GREEN)), green)
-        blue = times_plus(shine, _number(numbers, at, light + np.uint64(_BLUE)), blue)
+        red = times_plus(shine, _number(numbers, at, colour), red)
+        green = times_plus(shine, _number(numbers, at, colour + _ONE), green)
+        blue = times_plus(shine, _number(numbers, at, colour + np.uint64(2)), blue)
     return red, green, blue
 
 
