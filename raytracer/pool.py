@@ -84,7 +84,7 @@ class _Helpers:
         ]
         for thread in threads:
             thread.start()
-        self._ids = [thread.native_id for thread in threads]
+        self._ids = [thread.native_id for thread in threads if thread.native_id is not None]
         self._off: int | None = None  # the core that they are kept off
 
     def make_way(self) -> None:
@@ -96,7 +96,7 @@ class _Helpers:
         with suppress(OSError):
             rest = os.sched_getaffinity(0) - {core}
             for thread in self._ids if rest else ():
-                os.sched_setaffinity(thread or 0, rest)
+                os.sched_setaffinity(thread, rest)
 
 
 @cache

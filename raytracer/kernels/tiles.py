@@ -259,12 +259,12 @@ def _painter(
 
 
 paint_flat = _painter("paint_flat", _flat_tile, paint_quickly=flat_quickly, decide=decide_flat)
-_certainly = {"paint_quickly": diffuse_quickly, "finish": shade_anew, "decide": decide_diffuse}
-paint_diffuse = _painter("paint_diffuse", _diffuse_tile, **_certainly)
+_DIFFUSE = {"paint_quickly": diffuse_quickly, "finish": shade_anew, "decide": decide_diffuse}
+paint_diffuse = _painter("paint_diffuse", _diffuse_tile, **_DIFFUSE)
 paint_diffuse_unchecked = _painter(
     "paint_diffuse_unchecked", _diffuse_tile, see=see_tile_unchecked, paint_quickly=diffuse_quickly_unchecked
 )
-paint_diffuse_any = _painter("paint_diffuse_any", _diffuse_any_tile, **_certainly)
+paint_diffuse_any = _painter("paint_diffuse_any", _diffuse_any_tile, **_DIFFUSE)
 paint_full = _painter("paint_full", _full_tile)
 paint_normal = _painter("paint_normal", _normal_tile)
 find_hits = _painter("find_hits", _hits_tile, fill_tile=_no_hits_tile)
