@@ -323,7 +323,7 @@ class QuickScratch(NamedTuple):
     close: np.ndarray  # int32, which pairs of `blocks` have pixels close to another byte
     bits: np.ndarray  # int32, a bit for each of those
     late: np.ndarray  # int64 (1,), how many pixels are to be shaded in float64
-    late_columns: np.ndarray  # int32: those
+    late_columns: np.ndarray  # int32: those; and at the end, some that `kernels.doubts` has decided
     late_rows: np.ndarray  # int32
     spheres: np.ndarray  # int32, what they show
 

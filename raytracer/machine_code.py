@@ -16,23 +16,16 @@ from pathlib import Path
 from tempfile import gettempdir
 
 _HERE = Path(__file__).parent
-_SOURCES = (
-    "arrays",
-    "twofold",
-    "certified",
-    "boxes",
-    "facets",
-    "shading",
-    "bounce",
-    "methods",
-)  # what kernels call into
+SOURCES = (  # what kernels call into; `kernels.compiler` compiles these, and no others
+    "alike", "arrays", "bounce", "boxes", "camera", "certified", "facets", "methods", "quick", "shading", "twofold",
+)  # fmt: skip
 
 
 @cache
 def folder() -> Path | None:
     """The first place that can be written to; None if there is none."""
     kernels = _HERE / "kernels"
-    sources = [_HERE / f"{name}.py" for name in _SOURCES] + sorted(kernels.glob("*.py"))
+    sources = [_HERE / f"{name}.py" for name in SOURCES] + sorted(kernels.glob("*.py"))
     digest = hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()[:16]
     return next((place / digest for place in _places() if _can_write(place / digest)), None)
 

@@ -16,7 +16,7 @@ from contextlib import suppress
 from functools import cache, partial
 from itertools import count
 from queue import SimpleQueue
-from threading import Thread
+from threading import Thread, get_native_id
 from time import sleep
 from typing import TypeVar
 
@@ -85,18 +85,20 @@ class _Helpers:
         for thread in threads:
             thread.start()
         self._ids = [thread.native_id for thread in threads if thread.native_id is not None]
-        self._off: int | None = None  # the core that they are kept off
+        self._allowed: set[int] | None = None  # the cores that they are kept to
 
     def make_way(self) -> None:
-        """Keep them off the core of the thread that calls, as far as the system tells which that is."""
+        """Keep them off the core of the thread that calls, if it may run on others and the system tells which it is."""
         core = _this_core()
-        if core is None or core == self._off:
+        if core is None or get_native_id() in self._ids:
             return
-        self._off = core
         with suppress(OSError):
-            rest = os.sched_getaffinity(0) - {core}
-            for thread in self._ids if rest else ():
-                os.sched_setaffinity(thread, rest)
+            cores = os.sched_getaffinity(0)
+            allowed = cores - {core} or cores
+            if allowed != self._allowed:
+                for thread in self._ids:
+                    os.sched_setaffinity(thread, allowed)
+                self._allowed = allowed
 
 
 @cache
@@ -104,7 +106,7 @@ def _ask_core() -> Callable[[], int] | None:
     """The system's function that tells on which core it is called, if it has one."""
     if not hasattr(os, "sched_setaffinity"):
         return None
-    return getattr(ctypes.CDLL(None), "sched_getcpu", None)
+    return getattr(ctypes.PyDLL(None), "sched_getcpu", None)  # which keeps the interpreter's lock meanwhile
 
 
 def _this_core() -> int | None:
@@ -114,7 +116,8 @@ def _this_core() -> int | None:
 
 
 _helpers = cache(_Helpers)
-os.register_at_fork(after_in_child=_helpers.cache_clear)  # threads do not survive a fork
+if hasattr(os, "register_at_fork"):  # not on Windows
+    os.register_at_fork(after_in_child=_helpers.cache_clear)  # threads do not survive a fork
 
 
 def _do(jobs: list[Job], work: Callable[[Job, int], Done], finished: Callable[[Done], object] | None) -> None:

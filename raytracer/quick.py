@@ -23,7 +23,7 @@ numbers is off by (4.5 + 1.1|x|)u, of which disc has 2.2√T + 0.5 times 1/w, an
     error = u (14.2 T + 4 + (9.9 T + 14.4) / w)
 
 and a pixel with |disc| ≤ 4 · error · m is left to float64. For all others √disc is within 0.27 √(error · m), and k
-within (2.5ρ(√error/4 + 8u) + 24u)k, as it is from 0.7 to 1.3 times zm (the sine of the angle between a ray and the
+within (2.5ρ(√error/4 + 8u) + 24u)k, as it is from 0.7 to 1.301 times zm (the sine of the angle between a ray and the
 middle's is at most ρ): nearer to each other than the sum of both, two spheres are left to float64, too. s is below
 2ac / ((1 − ρ²)(m − ρ²)), which for one m is largest where U = V.
 
@@ -35,9 +35,9 @@ aw²·2c₁, and n by w·q, where cos is the root by its largest value and
 
     q = c₀ + c₁/cos,  c₁ = 1.5(s + t)η + (2.2t² + 3.85s² + 2)u,  c₀ = 2.84η + (7.4t + 6.5)u
 
-as long as cos² > 16c₁. (What float64 itself leaves of the error of its k, 2⁻²⁶ at most, is below 2⁻⁵³m/(ρ² cos), and
-added to c₁.) The point P is off by r·q and by 4u|P|, the light's place by u of itself; so the direction towards it by
-(r·q + 5u|light|) / |T| + 5u, as |P| ≤ |T| + |light|. n·T, the rough root of T·T and their product are off by 8u,
+as long as cos² > 16c₁. (What float64 leaves of the error of its k, 2⁻²⁶, is after a Newton step below 2⁻⁵³m/(ρ² cos),
+and added to c₁.) The point P is off by r·q and by 4u|P|, the light's place by u of itself; so the direction towards it
+by (r·q + 5u|light|) / |T| + 5u, as |P| ≤ |T| + |light|. n·T, the rough root of T·T and their product are off by 8u,
 colours by 2u, each light's sum by 1u. So a channel is off by 255 · (its diffuse colour) times
 
     Σ light · (q (1 + r/|T|) + 5u|light|/|T| + (16 + lights)u)

@@ -1,8 +1,11 @@
 """What may know what: checked in a fresh process, where nothing else has been imported."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
+
+from raytracer.machine_code import SOURCES
 
 ROOT = Path(__file__).parent.parent
 
@@ -70,6 +73,13 @@ def test_a_changed_source_does_not_run_stale_machine_code(tmp_path):
         "print(first.strip(), subprocess.run(run, cwd=copy, capture_output=True, text=True).stdout.strip())\n"
     )
     assert in_a_fresh_process(code) == "2.0 inf\n"
+
+
+def test_kernels_take_nothing_from_files_that_their_machine_code_is_not_named_after():
+    texts = [path.read_text() for path in (ROOT / "raytracer" / "kernels").glob("*.py")]
+    taken = {name for text in texts for name in re.findall(r"^from raytracer\.(\w+) import", text, re.MULTILINE)}
+    assert "quick" in taken
+    assert taken - {"kernels"} <= set(SOURCES)
 
 
 def test_a_compiler_that_cannot_be_loaded_is_told_of_and_done_without(tmp_path):

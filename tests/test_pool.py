@@ -43,6 +43,29 @@ def test_helpers_are_kept_off_the_core_of_whoever_calls():
         assert len(cores) == len(allowed) - 1
 
 
+@pytest.mark.skipif(not hasattr(os, "sched_getaffinity") or len(os.sched_getaffinity(0)) < 2, reason="no core to spare")
+def test_a_caller_that_keeps_to_one_core_does_not_keep_the_helpers_there():
+    allowed, both = os.sched_getaffinity(0), threading.Barrier(2, timeout=5)
+
+    def helper_cores():
+        cores = []
+
+        def work(job, worker):
+            both.wait()
+            if worker:
+                cores.append(os.sched_getaffinity(0))
+
+        share([0, 1], work, 2)
+        return cores
+
+    try:
+        os.sched_setaffinity(0, {min(allowed)})
+        assert helper_cores() == [{min(allowed)}]
+    finally:
+        os.sched_setaffinity(0, allowed)
+    assert len(helper_cores()[0]) == len(allowed) - 1
+
+
 def test_no_jobs_are_no_trouble():
     share([], lambda job, worker: job)
 

@@ -13,12 +13,13 @@ import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
+from importlib import import_module
 from types import FunctionType, ModuleType
 
 import numba
 from numba.extending import overload, register_jitable
 
-from raytracer import alike, bounce, boxes, camera, certified, facets, machine_code, methods, quick, shading, twofold
+from raytracer import machine_code, twofold
 from raytracer.kernels.lanes import PROCESSOR, MarkPairs, Marks, Mask, blend, fused
 
 
@@ -58,12 +59,11 @@ def _compile_calls_into(module: ModuleType) -> None:
             register_jitable(function)
 
 
-_SOURCES = (twofold, certified, camera, boxes, facets, shading, bounce, methods, quick, alike)
 _OVERLOADED = (twofold.select, twofold.exponent, twofold.scale)
 if PROCESSOR.get("fma"):
     _OVERLOADED += (twofold.two_product,)
-for _module in _SOURCES:
-    _compile_calls_into(_module)
+for _name in machine_code.SOURCES:
+    _compile_calls_into(import_module(f"raytracer.{_name}"))
 
 
 _CACHE = machine_code.folder()

@@ -80,4 +80,4 @@ decide_diffuse = variant(_decide_doubts, "decide_diffuse", shades=True)
 
 @inlined
 def leave_doubts(view, slow, bins, paints, scratch, doubts, out):
-    """All of them."""
+    """Decide none of them: they stay on the list."""

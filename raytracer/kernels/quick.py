@@ -6,7 +6,8 @@
                          number   which of the list that is
                          doubt    where single precision cannot tell
     doubt  ── _decide ─> number   in float64
-    number ── _shade ──> colour   where the depth was; what is too close to another byte by shade_anew, in float64
+    number ── _shade ──> colour   where the depth was, blocks of one sphere by `alike`; what is too close to another
+                                  byte by shade_anew, in float64
     colour ── put_tile > bytes of the picture
 
 A tile lies in `strips`. The formulas and the bounds of their errors are those of `quick`.
@@ -83,7 +84,7 @@ _MIDDLE, _MIDDLE_Y = TILE_WIDTH // 2, TILE_HEIGHT // 2
 _LIGHT = np.uint64(8)  # numbers a light
 _ONE, _SIXTEEN = np.uint64(1), np.uint64(SIXTEEN)
 _ZERO, _HALF, _UNIT, _THREE = np.float32(0.0), np.float32(0.5), np.float32(1.0), np.float32(3.0)
-_STEP, _LARGEST_K = np.float32(SIDE), np.float32(1.3)  # of a sphere, by that of its middle
+_STEP, _LARGEST_K = np.float32(SIDE), np.float32(1.31)  # of a sphere, by that of its middle
 _BORDER = np.float32(0.5 - 5.0 / ONE_BYTE)  # of two bytes, but for what roundings at the end add
 
 

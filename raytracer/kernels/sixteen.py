@@ -195,7 +195,7 @@ def rounded(typing, x):
 
 @intrinsic
 def pack(typing, red, green, blue):
-    """Colours as one number each, red in the lowest byte, of channels that are not below 0; 255 of those above it."""
+    """Colours as one number each, red in the lowest byte, of channels from 0 on, cut off at 255; the upper is any."""
     return red(red, green, blue), _by_sixteens("avx512bw", _packed, _shifted)
 
 

@@ -4,7 +4,7 @@
                 └─ paint_quickly, for tiles of small spheres ─> bytes (see `kernels.quick`)
 
 A painter does one tile, a row at a time, eight pixels at a time. Doubtful pixels are listed, and painted all the same:
-whoever called decides them and paints them anew.
+then `kernels.doubts` decides most of spheres, and whoever called the rest, and they are painted anew.
 """
 
 import numpy as np
@@ -37,17 +37,16 @@ from raytracer.kernels.quick import (
     flat_quickly,
     never_quickly,
     nothing_left,
-    put_pixel,
     shade_anew,
 )
-from raytracer.kernels.strips import fetch_row, start_of
+from raytracer.kernels.strips import fetch_row, put_pixel, start_of
 from raytracer.kernels.surfaces import ball_of, diffuse_of_any, diffuse_of_spheres, line_of, normal, ray_of
 from raytracer.kernels.visibility import STRIDE, list_doubts, see_tile, see_tile_unchecked
 from raytracer.shading import to_byte
 from raytracer.twofold import select
 
-# For doubts: those of a tile, then of pixels that have been put off until then, and at the end of those of that tile.
 _ROWS_AHEAD = 6  # that the processor fetches, where it does nothing but to write
+# For doubts: those of a tile, then of pixels that have been put off until then, and at the end of those of that tile.
 ROOM = 3 * TILE_WIDTH * TILE_HEIGHT + FEW_LATE
 
 
