@@ -12,23 +12,19 @@ from raytracer.alike import NEAREST_LIGHT, bounds_of, cubic_error, cubic_of, lea
 from raytracer.certified import inner
 from raytracer.kernels.compiler import borrowing, inlined, variant
 from raytracer.kernels.lanes import WIDTH, bits_of, blend, gather, gather_rows, load_low, spread, store_pair
+from raytracer.kernels.rough import inverse, twice_root
 from raytracer.kernels.sixteen import (
     both,
     columns_of_block,
     greater,
-    larger_size,
     load_two,
-    pack,
-    rest,
-    rough_inverse,
     rough_inverse_root,
-    rounded,
     rows_of_block,
     store_halves,
     times_plus,
     two,
 )
-from raytracer.kernels.strips import fetch_row, list_pair, pixel_of
+from raytracer.kernels.strips import apart, bytes_of, fetch_row, list_pair, pixel_of
 from raytracer.quick import ONE_BYTE, U
 from raytracer.twofold import select
 
@@ -36,7 +32,7 @@ _X_REST, _X_WHOLE, _Y_REST, _Y_WHOLE, _X_SLOPE, _Y_SLOPE, _START, _SIZE2 = range
 _B, _TWICE_ROOT_B, _ROOT_B, _RIM_ERROR, _SURE, _RIM, _OF_A_SPHERE = range(8, 15)
 _ACROSS, _DOWN, _ALONG, _CUBIC, _COLOUR, _OF_A_LIGHT = 0, 1, 2, 3, 7, 10
 _EIGHT, _ONE = np.uint64(WIDTH), np.uint64(1)
-_HALF, _UNIT, _ZERO, _THREE = np.float32(0.5), np.float32(1.0), np.float32(0.0), np.float32(3.0)
+_ZERO, _HALF, _UNIT = np.float32(0.0), np.float32(0.5), np.float32(1.0)
 
 
 @inlined
@@ -150,19 +146,15 @@ def _shade(tile, count, quick, sheet, out):
         h = times_plus(-x, x, times_plus(-y, y, _number(numbers, at, _SIZE2)))
         disc = times_plus(e, e, h)
         rough = rough_inverse_root(disc)
-        root = disc * rough
-        root = root * times_plus(-root, rough, _THREE)  # twice the root
         a = times_plus(e, _number(numbers, at, _TWICE_ROOT_B), _number(numbers, at, _B) - h)
-        over = rough_inverse(a)
-        over = times_plus(times_plus(-a, over, _UNIT), over, over)
-        tau = times_plus(times_plus(root, _HALF, e), _number(numbers, at, _ROOT_B), -h) * over  # −τ
+        root = times_plus(twice_root(disc, rough), _HALF, e)
+        tau = times_plus(root, _number(numbers, at, _ROOT_B), -h) * inverse(a)  # −τ
         red, green, blue = _lights(numbers, at, lights, x, y, tau)
-        colour, hit = pack(rounded(red), rounded(green), rounded(blue)), load_two(sheet.number, p, q) > 0
-        store_pair(sheet.colour, p, q, blend(hit, colour, quick.background))
+        hit = load_two(sheet.number, p, q) > 0
+        store_pair(sheet.colour, p, q, blend(hit, bytes_of(red, green, blue), quick.background))
         if certain:
-            apart = larger_size(larger_size(rest(red), rest(green)), rest(blue))
             limit = times_plus(-rough, _number(numbers, at, _RIM_ERROR), _number(numbers, at, _SURE))
-            bits = bits_of(hit & ~((apart < limit) & (disc > _number(numbers, at, _RIM))))
+            bits = bits_of(hit & ~((apart(red, green, blue) < limit) & (disc > _number(numbers, at, _RIM))))
             close = list_pair(sheet, close, k, bits)
     return close
 

@@ -27,6 +27,7 @@ from raytracer.kernels.lanes import (
     store,
     store_boxes,
 )
+from raytracer.kernels.rough import inverse
 from raytracer.kernels.sixteen import (
     ascending,
     count_ones,
@@ -134,8 +135,7 @@ def _glance(near, x, y, z, radius):
     u, v, w, four = near.u, near.v, near.w, radius * _FOUR
     across, up = _along(u, x, y, z), _along(v, x, y, z)
     depth = -_along(w, x, y, z)
-    away, over = abs(depth), rough_inverse(depth)
-    over = times_plus(times_plus(-depth, over, _UNIT), over, over)
+    away, over = abs(depth), inverse(depth)
     across, up, rho = across * over, up * over, radius * over
     across2, up2, rho2 = across * across, up * up, rho * rho
     m, rest = across2 + up2 + _UNIT, _UNIT - rho2

@@ -9,13 +9,13 @@ import numpy as np
 from raytracer.camera import fine_ray
 from raytracer.kernels.bounds import TILE_HEIGHT, TILE_WIDTH
 from raytracer.kernels.compiler import borrowing, inlined, variant
-from raytracer.kernels.lanes import WIDTH, load, store, whole
+from raytracer.kernels.lanes import WIDTH, load
+from raytracer.kernels.quick import pad_late, put_late, shade_late
 from raytracer.kernels.sixteen import lowest_bit
 from raytracer.kernels.strips import put_pixel, start_of
-from raytracer.kernels.surfaces import diffuse_at, rays_of
+from raytracer.kernels.surfaces import rays_of
 from raytracer.kernels.trace import try_twofold
 from raytracer.kernels.visibility import holding, sphere_of
-from raytracer.shading import to_byte
 
 
 def _decide_doubts(view, slow, bins, paints, scratch, doubts, out):
@@ -60,18 +60,12 @@ def _nearest(view, bins, quick, tile, row, column):
 
 @inlined
 def _shade_hits(view, paints, scratch, count, out):
-    """Paint up to eight hits, as `surfaces.diffuse_of` shades them."""
+    """Paint up to eight hits."""
     sheet = scratch.quick
-    for spare in range(count, np.uint64(WIDTH)):
-        scratch.k[spare], sheet.spheres[spare] = scratch.k[0], sheet.spheres[0]
-        sheet.late_rows[spare], sheet.late_columns[spare] = sheet.late_rows[0], sheet.late_columns[0]
-    where, rows, columns = load(sheet.spheres, 0), load(sheet.late_rows, 0), load(sheet.late_columns, 0)
-    _, _, direction = rays_of(view, rows, columns)
-    red, green, blue = diffuse_at(view, paints, direction, load(scratch.k, 0), columns, where, scratch)
-    red, green, blue = whole(to_byte(red)), whole(to_byte(green)), whole(to_byte(blue))
-    store(sheet.spheres, 0, red + green * 256 + blue * 65536)
-    for k in range(count):
-        put_pixel(out, start_of(out, sheet.late_rows[k], sheet.late_columns[k]), sheet.spheres[k])
+    pad_late(sheet, count)
+    _, _, direction = rays_of(view, load(sheet.late_rows, 0), load(sheet.late_columns, 0))
+    shade_late(view, paints, direction, load(scratch.k, 0), 0, scratch)
+    put_late(sheet, count, out)
 
 
 decide_flat = variant(_decide_doubts, "decide_flat", shades=False)

@@ -37,22 +37,18 @@ from raytracer.kernels.lanes import (
     store_pair,
     whole,
 )
+from raytracer.kernels.rough import inverse, twice_root
 from raytracer.kernels.sixteen import (
     SIDE,
     both,
     columns_of_block,
     gather_to_columns,
     greater,
-    larger_size,
     load_columns,
     load_numbers,
     load_two,
     lowest_bit,
-    pack,
-    rest,
-    rough_inverse,
     rough_inverse_root,
-    rounded,
     rows_of_block,
     sixteen,
     spread_rows,
@@ -64,6 +60,8 @@ from raytracer.kernels.sixteen import (
 from raytracer.kernels.strips import (
     PIXELS,
     STRIP,
+    apart,
+    bytes_of,
     fetch_row,
     is_in,
     list_pair,
@@ -199,7 +197,7 @@ def _draw(entry, number, j, tie, sheet):
         for _ in range(right - left):
             x, best = columns + shift, load(sheet.depth, p)
             disc = times_plus(x, times_plus(x, -xx, slope), of_row)
-            root = _twice_root(disc, rough_inverse_root(disc))
+            root = twice_root(disc, rough_inverse_root(disc))
             k = times_plus(root, half, times_plus(x, spread(k1), k_row))
             wins = k < best
             store(sheet.depth, p, blend(wins, k, best))
@@ -218,13 +216,6 @@ def _doubt(sheet, p, bits):
     sheet.doubtful[0] = 1
     for row in range(np.uint64(SIDE)):
         sheet.doubt[p // np.uint64(SIDE) + row] |= bits >> SIDE * row & (1 << SIDE) - 1
-
-
-@inlined
-def _twice_root(x, rough):
-    """2√x from a rough 1 / √x."""
-    root = x * rough
-    return root * times_plus(-root, rough, _THREE)
 
 
 @borrowing
@@ -371,9 +362,8 @@ def _light(quick, sheet, x, y, u, v, limits):
     focus, focus2, du, dv = np.float32(quick.focus), np.float32(quick.focus * quick.focus), x - at_x, at_y - y
     along, a, size2 = times_plus(du, u, dv * v), times_plus(u, u, times_plus(v, v, focus2)), size * size
     disc = times_plus(along, along, a * (size2 - times_plus(du, du, dv * dv)))
-    rough, over = rough_inverse_root(disc), rough_inverse(a)
-    over = times_plus(times_plus(-a, over, _UNIT), over, over)
-    tau = times_plus(_twice_root(disc, rough), _HALF, along) * over  # −τ
+    rough = rough_inverse_root(disc)
+    tau = times_plus(twice_root(disc, rough), _HALF, along) * inverse(a)  # −τ
     t, nu, nv, nw = times_plus(-tau, unit, unit), times_plus(-tau, u, du), times_plus(-tau, v, dv), tau * focus
     pu, pv, pw = t * u, t * v, t * focus
     (longest, rim, flat), light, nothing = limits, quick.lights, both(spread(_ZERO))
@@ -392,9 +382,10 @@ def _light(quick, sheet, x, y, u, v, limits):
     error = times_plus(nearness, np.float32(quick.far), np.float32(quick.rounding))
     error = times_plus(times_plus(nearness, unit * size, np.float32(quick.weight)), off, error)
     red, green, blue = red * r, green * g, blue * b
-    apart = larger_size(larger_size(rest(red), rest(green)), rest(blue))
-    sure = (apart < times_plus(-error * size, greater(greater(r, g), b), _BORDER)) & (disc > size2 * rim)
-    return pack(rounded(red), rounded(green), rounded(blue)), sure
+    sure = (apart(red, green, blue) < times_plus(-error * size, greater(greater(r, g), b), _BORDER)) & (
+        disc > size2 * rim
+    )
+    return bytes_of(red, green, blue), sure
 
 
 @borrowing
@@ -424,9 +415,7 @@ def shade_anew(view, paints, scratch, doubts, out):
     """
     sheet = scratch.quick
     count, sheet.late[0], width = sheet.late[0], 0, len(view.across) - WIDTH
-    for spare in range(count, count + WIDTH):
-        sheet.late_columns[spare], sheet.late_rows[spare] = sheet.late_columns[0], sheet.late_rows[0]
-        sheet.spheres[spare] = sheet.spheres[0]
+    pad_late(sheet, count)
     for k in range(np.uint64(0), np.uint64(count), np.uint64(WIDTH)):
         where, rows, columns = load(sheet.spheres, k), load(sheet.late_rows, k), load(sheet.late_columns, k)
         t, direction, doubt = meet_spheres(view, rows, columns, where)
@@ -436,9 +425,31 @@ def shade_anew(view, paints, scratch, doubts, out):
             bits &= bits - 1
             doubts[0] += 1
             doubts[doubts[0]] = sheet.late_rows[pixel] * width + sheet.late_columns[pixel]
-        red, green, blue = diffuse_at(view, paints, direction, t, columns, where, scratch)
-        red, green, blue = whole(to_byte(red)), whole(to_byte(green)), whole(to_byte(blue))
-        store(sheet.spheres, k, red + green * 256 + blue * 65536)
+        shade_late(view, paints, direction, t, k, scratch)
+    put_late(sheet, count, out)
+
+
+@inlined
+def pad_late(sheet, count):
+    """Pixels and spheres are read eight at a time."""
+    for spare in range(count, count + WIDTH):
+        sheet.late_columns[spare], sheet.late_rows[spare] = sheet.late_columns[0], sheet.late_rows[0]
+        sheet.spheres[spare] = sheet.spheres[0]
+
+
+@inlined
+def shade_late(view, paints, direction, t, k, scratch):
+    """Put colours in the place of eight spheres, from number k on, as `surfaces.diffuse_of` shades them."""
+    sheet = scratch.quick
+    where, columns = load(sheet.spheres, k), load(sheet.late_columns, k)
+    red, green, blue = diffuse_at(view, paints, direction, t, columns, where, scratch)
+    red, green, blue = whole(to_byte(red)), whole(to_byte(green)), whole(to_byte(blue))
+    store(sheet.spheres, k, red + green * 256 + blue * 65536)
+
+
+@inlined
+def put_late(sheet, count, out):
+    """Put so many of those colours where their pixels are."""
     for k in range(count):
         put_pixel(out, start_of(out, sheet.late_rows[k], sheet.late_columns[k]), sheet.spheres[k])
 

@@ -14,7 +14,7 @@ import numpy as np
 from raytracer.kernels.bounds import TILE_HEIGHT, TILE_WIDTH
 from raytracer.kernels.compiler import inlined
 from raytracer.kernels.lanes import SIXTEEN, fetch_to_write
-from raytracer.kernels.sixteen import SIDE, put_sixteen
+from raytracer.kernels.sixteen import SIDE, larger_size, pack, put_sixteen, rest, rounded
 
 STRIP = SIDE * TILE_HEIGHT  # pixels of a strip
 PIXELS = np.uint64(TILE_WIDTH * TILE_HEIGHT)
@@ -30,6 +30,18 @@ def pixel_of(p):
 def is_in(tile, x, y):
     """Whether the picture has that pixel of the tile."""
     return tile.left + x < tile.right and tile.top + y < tile.bottom
+
+
+@inlined
+def bytes_of(red, green, blue):
+    """Channels from 0 on as `pack` has them."""
+    return pack(rounded(red), rounded(green), rounded(blue))
+
+
+@inlined
+def apart(red, green, blue):
+    """How far the one of three channels that is closest to another byte is from its own, ½ at most."""
+    return larger_size(larger_size(rest(red), rest(green)), rest(blue))
 
 
 @inlined

@@ -4,6 +4,7 @@ import numpy as np
 
 from raytracer.kernels.compiler import borrowing
 from raytracer.kernels.lanes import WIDTH, is_hit, load, spread
+from raytracer.kernels.strips import start_of
 from raytracer.kernels.tiles import put_lanes
 from raytracer.shading import grey_of, to_byte
 from raytracer.twofold import select
@@ -59,6 +60,6 @@ def paint_edges(t, index, near, far, first, last, width, scratch, paints, out):
             p = np.uint64(row * width + x)
             right = np.uint64(1) if x + 1 < width else np.uint64(0)
             edge = (index[p] != index[p + right]) | (index[p] != index[p + below])
-            start = np.uint64(row * out.row_bytes + x * out.pixel_bytes)
+            start = start_of(out, row, x)
             byte = np.uint8(0) if edge else np.uint8(255)
             out.bytes[start], out.bytes[start + np.uint64(1)], out.bytes[start + np.uint64(2)] = byte, byte, byte
