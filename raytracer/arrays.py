@@ -346,6 +346,7 @@ class Quick(NamedTuple):
     weight: float  # the sum of those
     far: float  # what the error of a light's place adds where it is near
     rounding: float  # what roundings add
+    parts: int  # of a pixel, in which places of spheres are whole numbers
     background: int  # bytes: red, green, blue from the lowest on
     flat: int
 

@@ -29,9 +29,10 @@ middle's is at most ρ): nearer to each other than the sum of both, two spheres 
 
 **What colour it has.** In pixels, with D = (u, v, −f), the hit is at n = δ + τD from the sphere's middle, where
 δ = (x, y, 0), τ = −(g + √(g² + a(w² − δ²))) / a, g = δ·D, a = D·D. Let s² be the largest a/f² of a pixel of the tile,
-and t² = s² − 1; then |δ| ≤ 1.05sw. u and v are exact, X and Y rounded once, x and y too; so δ is off by √2ηw,
-η = u(0.71(|X| + |Y|)/w + 0.75s); f and w are rounded once. So g is off by √a·w(1.42η + 2.1tu), the root's argument by
-aw²·2c₁, and n by w·q, where cos is the root by its largest value and
+and t² = s² − 1; then |δ| ≤ 1.05sw. u and v are exact; X and Y are rounded to whole parts of a pixel, of which it
+has 2ᵏ, and x and y, whole numbers of those, are rounded once; so δ is off by √2ηw, η = 2⁻ᵏ/2w + 0.75su; f and w are
+rounded once. So g is off by √a·w(1.42η + 2.1tu), the root's argument by aw²·2c₁, and n by w·q, where cos is the root by
+its largest value and
 
     q = c₀ + c₁/cos,  c₁ = 1.5(s + t)η + (2.2t² + 3.85s² + 2)u,  c₀ = 2.84η + (7.4t + 6.5)u
 
@@ -42,13 +43,15 @@ colours by 2u, each light's sum by 1u. So a channel is off by 255 · (its diffus
 
     Σ light · (q (1 + r/|T|) + 5u|light|/|T| + (16 + lights)u)
 
-and what comes that close to the border of two bytes is shaded anew, in float64.
+and what comes that close to the border of two bytes is shaded anew, in float64. `kernels.limits` puts
+into this how close a tile's spheres are to the lights at most; c₁ is a sphere's own, and 1/cos = √a·w / √disc a
+pixel's. With e for all that is added to c₀, (c₀ + e) / c₁ is largest for η = 0.75su.
 """
 
 from __future__ import annotations
 
 from functools import lru_cache
-from math import hypot
+from math import frexp, hypot
 
 import numpy as np
 
@@ -69,7 +72,8 @@ _BRIGHTEST = 1e4
 _SPARE = 1.1  # for squares of errors
 _ROOT = 2.0**-9  # about √error
 _LEAST = 15 / 16  # 1 − ρ²
-_ROUGHLY = 1.0 + 2.0**-13  # what a rough root may be too small by
+LIGHT = 8  # numbers of a light
+_FROM_MIDDLE = 128.0  # pixels of a tile; a sphere is at most 1.05 · √m · f/4 large
 
 
 def error_of(steep: float, rho: Number, blur: Number) -> Number:
@@ -83,19 +87,27 @@ def near_of(rho: Number, error: Number) -> Number:
     return 2.1 * (2.5 * rho * ((error / _ROOT + _ROOT) * 0.125 + 8.0 * U) + 24.0 * U)
 
 
-def flatness_of(s: float) -> float:
-    """c₀ / c₁, at most."""
-    t2 = s * s - 1.0
-    t = np.sqrt(t2)
-    return float(max(2.84 / (1.5 * (s + t)), (7.4 * t + 6.5) / (2.2 * t2 + 3.85 * s * s + 2.0)))
+def flatness_of(parts: float, blur: Number, s: float) -> Number:
+    """c₀, for 2ᵏ, 1 / w and s."""
+    return _SPARE * (2.84 * _off(parts, blur, s) + U * (7.4 * np.sqrt(s * s - 1.0) + 6.5))
 
 
-def coarseness_of(away: Number, blur: Number, s: float, focus: float, widest: float) -> Number:
-    """c₁, for |X| + |Y|, 1 / w, s, f and the largest m."""
+def coarseness_of(parts: float, blur: Number, s: float, focus: float, widest: float) -> Number:
+    """c₁, for 2ᵏ, 1 / w, s, f and the largest m."""
     t2 = s * s - 1.0
-    wide = _SPARE * U * 1.5 * (s + np.sqrt(t2))
-    rest = 0.75 * s * wide + _SPARE * U * (2.2 * t2 + 3.85 * s * s + 2.0)
-    return (2.0**-53 * widest * focus * focus * blur + 0.71 * wide * away) * blur + rest
+    form = 1.5 * (s + np.sqrt(t2)) * _off(parts, blur, s) + U * (2.2 * t2 + 3.85 * s * s + 2.0)
+    return _SPARE * form + (2.0**-53 * widest * focus * focus) * (blur * blur)
+
+
+def _off(parts: float, blur: Number, s: float) -> Number:
+    """η."""
+    return blur * (0.5 / parts) + 0.75 * U * s
+
+
+def _parts_of(focus: float, widest: float) -> int:
+    """Of how many parts a pixel is, a power of two: from the middle of a tile to any sphere's, int32 holds them."""
+    _, bits = frexp(_FROM_MIDDLE + 0.3 * widest**0.5 * focus)
+    return int(2 ** max(0, 31 - bits))
 
 
 @lru_cache(maxsize=8)
@@ -115,7 +127,7 @@ def make_quick(
         weight, farthest = weight + strength, max(farthest, hypot(*away))
         place = (inner(*axis, *away) for axis in (camera.u, camera.v, camera.w))
         halves = (0.5 * channel for channel in light.colour)  # of what twice a cosine is multiplied by
-        rows.append([*place, *halves, strength * _ROUGHLY, 0.0])
+        rows.append([*place, *halves, strength, 0.0])
     widest = 1.0 + (across + _BEYOND) ** 2 + (up + _BEYOND) ** 2
     steep = 0.5 * (1.0 + widest) ** 2 / (_LEAST * (widest - 1.0 + _LEAST))
     usable = bool(
@@ -127,7 +139,8 @@ def make_quick(
         usable, camera.u, camera.v, camera.w, focus,
         middle_x, middle_y, float(raster.whole_height), focal_length(camera.fov), steep, widest,
         np.array(rows if usable else [], np.float32).reshape(-1),
-        weight, 5 * U * farthest, (16 + len(rows)) * U * weight, packed(background), packed(flat),
+        weight, 5 * U * farthest, (16 + len(rows)) * U * weight, _parts_of(focus, widest),
+        packed(background), packed(flat),
     )  # fmt: skip
 
 

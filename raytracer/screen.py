@@ -373,7 +373,7 @@ def _glass(scene: Scene, screen: Screen) -> Mirrors:
 
 _AXIS = 0.0, 0.0, 0.0
 _NO_QUICK = Quick(
-    False, _AXIS, _AXIS, _AXIS, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, np.empty(0, np.float32), 0.0, 0.0, 0.0, 0, 0
+    False, _AXIS, _AXIS, _AXIS, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, np.empty(0, np.float32), 0.0, 0.0, 0.0, 1, 0, 0
 )  # fmt: skip
 _NO_PAINTS = Paints(
     _NO_QUICK, np.zeros(3), np.zeros(16, np.int32), np.zeros(3), np.empty((0, 6)), Materials().diffuse.reshape(-1)

@@ -37,9 +37,11 @@ from raytracer.kernels.lanes import (
     store_pair,
     whole,
 )
+from raytracer.kernels.limits import limits_of, no_extremes, widened
 from raytracer.kernels.rough import inverse, twice_root
 from raytracer.kernels.sixteen import (
     SIDE,
+    beyond,
     both,
     columns_of_block,
     gather_to_columns,
@@ -56,6 +58,7 @@ from raytracer.kernels.sixteen import (
     store_table,
     times_plus,
     two,
+    whole_numbers,
 )
 from raytracer.kernels.strips import (
     PIXELS,
@@ -72,18 +75,17 @@ from raytracer.kernels.strips import (
 )
 from raytracer.kernels.surfaces import diffuse_at, meet_spheres
 from raytracer.kernels.visibility import AHEAD, corners_of, fetch, from_eye, holding, sphere_of
-from raytracer.quick import FARTHEST, NEAREST, ONE_BYTE, coarseness_of, error_of, flatness_of, near_of
+from raytracer.quick import FARTHEST, LIGHT, NEAREST, ONE_BYTE, coarseness_of, error_of, near_of
 from raytracer.shading import to_byte
 from raytracer.twofold import select
 
 MOST = 1 << 12  # spheres of a tile's list; of more, the table would leave the core's caches
 FEW_LATE = 256  # pixels to be shaded in float64: enough for a while
 _MIDDLE, _MIDDLE_Y = TILE_WIDTH // 2, TILE_HEIGHT // 2
-_LIGHT = np.uint64(8)  # numbers a light
 _ONE, _SIXTEEN = np.uint64(1), np.uint64(SIXTEEN)
+_BORDER = np.float32(0.5 - 5.0 / ONE_BYTE)  # of two bytes, but for what roundings at the end add
 _ZERO, _HALF, _UNIT, _THREE = np.float32(0.0), np.float32(0.5), np.float32(1.0), np.float32(3.0)
 _STEP, _LARGEST_K = np.float32(SIDE), np.float32(1.31)  # of a sphere, by that of its middle
-_BORDER = np.float32(0.5 - 5.0 / ONE_BYTE)  # of two bytes, but for what roundings at the end add
 
 
 def _paint_tile(view, slow, bins, tile, scratch, doubts, paints, out):
@@ -93,37 +95,37 @@ def _paint_tile(view, slow, bins, tile, scratch, doubts, paints, out):
         return False
     if end < bins.starts[tile.number + 1]:
         return False
-    coarsest = draw_all(view, bins, first, end, tile, paints, sheet)
-    if coarsest < 0.0:
+    fit, extremes = draw_all(view, bins, first, end, tile, paints, sheet)
+    if not fit:
         sheet.doubt[:], sheet.doubtful[0] = 0, 0
         return False
     if certain and sheet.doubtful[0]:
         _decide(view, bins, tile, sheet, doubts)
-    colour_all(view, bins, tile, coarsest, paints, sheet, out)
+    colour_all(view, bins, tile, extremes, paints, sheet, out)
     return True
 
 
 def _draw_all(view, bins, first, end, tile, paints, sheet):
-    """Fill the depth buffer; returns how coarse the coarsest sphere is, −1 if single precision is not for all."""
+    """Fill the depth buffer; returns whether single precision is for all spheres, and the extremes of them."""
     align_stack()
     for p in range(np.uint64(0), PIXELS, _SIXTEEN):
         store(sheet.depth, p, spread(np.float32(np.inf)))
         store(sheet.number, p, sixteen(0))
     store(sheet.table, 0, spread(_ZERO))
-    tie, coarsest, s = _ZERO, spread(0.0), _longest(paints.quick, tile) / paints.quick.focus
+    tie, extremes, s = _ZERO, no_extremes(), _longest(paints.quick, tile) / paints.quick.focus
     for at in range(first, end, WIDTH):
         count, row = min(WIDTH, end - at), np.uint64(at - first)
-        unfit, near, coarse = look(view, bins, np.uint64(at), row, tile, s, paints, sheet)
+        unfit, near, blur, radius, depth = look(view, bins, np.uint64(at), row, tile, s, paints, sheet)
         if bits_of(unfit) & ((1 << count) - 1):
-            return np.float32(-1.0)
+            return False, extremes
         listed = mask_of((1 << count) - 1)
         tie = max(tie, np.float32(_largest(select(listed, near, 0.0))))
-        coarsest = select(listed & (coarse > coarsest), coarse, coarsest)
+        extremes = widened(extremes, listed, blur, radius, depth)
         for j in range(np.uint64(0), np.uint64(count)):
             place = np.uint64(at) + j
             fetch(view, sphere_of(bins.entries[place + np.uint64(AHEAD)]))
             draw(bins.entries[place], np.int32(row + j + _ONE), j, tie, sheet)
-    return np.float32(_largest(coarsest))
+    return True, extremes
 
 
 @inlined
@@ -131,12 +133,17 @@ def _largest(lanes):
     return -smallest_of(-lanes)
 
 
+@inlined
+def _larger(a, b):
+    return select(a > b, a, b)
+
+
 def _look(view, bins, at, row, tile, s, paints, sheet):
     """Work out what is drawn and shaded of the next eight spheres of a list.
 
-    Returns for which of them single precision is not, how much k may be off, and how coarse they are.
+    Returns for which of them single precision is not, how much k may be off, and 1 / w, radius and depth.
     """
-    quick, batch, where, coarse = paints.quick, sheet.batch, load_low(bins.entries, at), spread(0.0)
+    quick, batch, where = paints.quick, sheet.batch, load_low(bins.entries, at)
     x, y, z, radius = gather_rows(view.balls, where)
     x, y, z = x - view.eye[0], y - view.eye[1], z - view.eye[2]
     depth, pixel = -inner(quick.w[0], quick.w[1], quick.w[2], x, y, z), 1.0 / quick.focus
@@ -167,14 +174,16 @@ def _look(view, bins, at, row, tile, s, paints, sheet):
     store_halves(batch, 104, -0.5 * radius)
     store_halves(batch, 112, 4.0 * error * m)
     if shades:
-        away, scale = abs(middle_x) + abs(middle_y), 255.0 * blur
-        coarse = coarseness_of(away, blur, s, quick.focus, quick.widest)
+        parts = np.float64(quick.parts)
+        size, scale = rho * (quick.focus * parts), (255.0 / parts) * blur
         red, green, blue, _ = gather_rows(paints.colours, gather(view.material, where))
+        brightest = 255.0 * _larger(_larger(red, green), blue)
+        off = coarseness_of(quick.parts, blur, s, quick.focus, quick.widest) * brightest
         store_table(
-            sheet.table, row + _ONE, middle_x, middle_y, rho * quick.focus, depth * pixel, red * scale, green * scale,
-            blue * scale, coarse,
+            sheet.table, row + _ONE, middle_x * parts, middle_y * parts, size, depth * (pixel / parts), red * scale,
+            green * scale, blue * scale, off,
         )  # fmt: skip
-    return unfit, near_of(rho, error), coarse
+    return unfit, near_of(rho, error), blur, radius, depth
 
 
 def _draw(entry, number, j, tie, sheet):
@@ -263,16 +272,16 @@ def _first_of(view, bins, tile, x, y):
     return number, unsure
 
 
-def _colour_all(view, bins, tile, coarsest, paints, sheet, out):
+def _colour_all(view, bins, tile, extremes, paints, sheet, out):
     """Colours, and then bytes."""
     align_stack()
-    count = colour_tile(view, bins, tile, _limits(paints.quick, tile, coarsest), paints, sheet, out)
+    count = colour_tile(view, bins, tile, extremes, paints, sheet, out)
     put_tile(tile, sheet, out)
     _keep_for_later(bins, tile, count, sheet)
 
 
 @inlined
-def _flat(view, bins, tile, limits, paints, sheet, out):
+def _flat(view, bins, tile, extremes, paints, sheet, out):
     """One colour wherever anything is hit."""
     flat, background = sixteen(paints.quick.flat), sixteen(paints.quick.background)
     for p in range(np.uint64(0), PIXELS, _SIXTEEN):
@@ -280,19 +289,22 @@ def _flat(view, bins, tile, limits, paints, sheet, out):
     return 0
 
 
-def _shade(view, bins, tile, limits, paints, sheet, out):
+def _shade(view, bins, tile, extremes, paints, sheet, out):
     """`stages.diffuse`; meanwhile the processor fetches where the bytes go.
 
     Returns how many pairs of blocks have been listed that have pixels close to another byte.
     """
     quick = paints.quick
     (alike, mixed), done, close = _sort_blocks(sixteen(quick.background), sheet), np.uint64(0), 0
-    first, end, s = bins.starts[tile.number], bins.middles[tile.number], _longest(quick, tile) / quick.focus
+    first, end, longest = bins.starts[tile.number], bins.middles[tile.number], _longest(quick, tile)
     worth = end - first <= np.int64(alike)  # else the numbers of all spheres cost more than they save
-    if worth and tabulate(view, bins, first, end, tile, s, paints, sheet.numbers):
+    if worth and tabulate(view, bins, first, end, tile, longest / quick.focus, paints, sheet.numbers):
         done, close = alike, shade_alike(tile, alike, quick, sheet, out)
-    columns, rows = both(columns_of_block()) - _MIDDLE, both(rows_of_block()) - _MIDDLE_Y
-    left, up = np.float32(tile.left + _MIDDLE - quick.middle_x), np.float32(quick.middle_y - tile.top - _MIDDLE_Y)
+    of_slope, of_all, steepest = limits_of(quick, tile, longest, extremes)
+    columns, rows, parts = both(columns_of_block()) - _MIDDLE, both(rows_of_block()) - _MIDDLE_Y, np.int32(quick.parts)
+    us = (columns + np.float32(tile.left + _MIDDLE - quick.middle_x)) * np.float32(parts)
+    vs = (np.float32(quick.middle_y - tile.top - _MIDDLE_Y) - rows) * np.float32(parts)
+    columns, rows = whole_numbers(columns) * parts, whole_numbers(rows) * parts
     for k in range(done, alike + mixed, np.uint64(2)):
         fetch_row(tile, tile.top + np.int64(k) // 2, out)
         p, q = np.uint64(sheet.blocks[k]), np.uint64(sheet.blocks[k + _ONE])
@@ -301,13 +313,15 @@ def _shade(view, bins, tile, limits, paints, sheet, out):
         else:
             gather_to_columns(sheet.table, sheet.number, p, q, sheet.columns)
         (x, y), (x2, y2) = pixel_of(np.int64(p)), pixel_of(np.int64(q))
-        x, y = columns + two(np.float32(x), np.float32(x2)), rows + two(np.float32(y), np.float32(y2))
-        colour, sure = _light(quick, sheet, x, y, x + left, up - y, limits)
+        x, x2, y, y2 = np.int32(x) * parts, np.int32(x2) * parts, np.int32(y) * parts, np.int32(y2) * parts
+        u, v = us + two(np.float32(x), np.float32(x2)), vs - two(np.float32(y), np.float32(y2))
+        colour, steep, off = _light(quick, sheet, columns + two(x, x2), rows + two(y, y2), u, v)
         hit = load_two(sheet.number, p, q) > 0
-        store_pair(sheet.colour, p, q, blend(hit, colour, quick.background))
+        store_pair(sheet.colour, p, q, blend(hit, bytes_of(*colour), quick.background))
         if certain:
-            bits = bits_of(hit & ~sure)
-            close = list_pair(sheet, close, k, bits)
+            limit = times_plus(times_plus(steep, -of_slope, -of_all), off, _BORDER)
+            sure = (apart(*colour) < limit) & (steep < steepest)
+            close = list_pair(sheet, close, k, bits_of(hit & ~sure))
     return close
 
 
@@ -345,30 +359,24 @@ def _longest(quick, tile):
 
 
 @inlined
-def _limits(quick, tile, coarsest):
-    """What a tile's bounds of errors in colours share: the longest ray, how dark a rim has none, and c₀ / c₁."""
-    longest = _longest(quick, tile)
-    rim, flat = 16.0 * longest * longest * coarsest, flatness_of(longest / quick.focus)
-    return np.float32(longest), np.float32(rim), np.float32(flat)
+def _light(quick, sheet, x, y, u, v):
+    """Three channels of two blocks of pixels, from 0 to 255; w / √disc, and c₁ times the sphere's brightest channel.
 
-
-@inlined
-def _light(quick, sheet, x, y, u, v, limits):
-    """Three channels of two blocks of pixels, in parts of a byte, bounds of their errors, and where there are none.
-
-    x and y count from the middle of the tile, u and v from the middle of the picture: the ray is (u, v, −focus).
+    Lengths are in parts of a pixel: x and y from the middle of the tile, u and v from that of the picture, so that the
+    ray is (u, v, −focus).
     """
-    at_x, at_y, size, unit, r, g, b, coarse = load_columns(sheet.columns)
-    focus, focus2, du, dv = np.float32(quick.focus), np.float32(quick.focus * quick.focus), x - at_x, at_y - y
-    along, a, size2 = times_plus(du, u, dv * v), times_plus(u, u, times_plus(v, v, focus2)), size * size
-    disc = times_plus(along, along, a * (size2 - times_plus(du, du, dv * dv)))
+    at_x, at_y, size, unit, r, g, b, off = load_columns(sheet.columns)
+    fine = quick.focus * quick.parts
+    focus, focus2, du, down = np.float32(fine), np.float32(fine * fine), beyond(x, at_x), beyond(y, at_y)
+    along, a, size2 = times_plus(du, u, -(down * v)), times_plus(u, u, times_plus(v, v, focus2)), size * size
+    disc = times_plus(along, along, a * (size2 - times_plus(du, du, down * down)))
     rough = rough_inverse_root(disc)
     tau = times_plus(twice_root(disc, rough), _HALF, along) * inverse(a)  # −τ
-    t, nu, nv, nw = times_plus(-tau, unit, unit), times_plus(-tau, u, du), times_plus(-tau, v, dv), tau * focus
+    t, nu, nv, nw = times_plus(-tau, unit, unit), times_plus(-tau, u, du), times_plus(-tau, v, -down), tau * focus
     pu, pv, pw = t * u, t * v, t * focus
-    (longest, rim, flat), light, nothing = limits, quick.lights, both(spread(_ZERO))
-    red, green, blue, nearness = nothing, nothing, nothing, nothing
-    for i in range(np.uint64(0), np.uint64(len(light)), _LIGHT):
+    light, nothing = quick.lights, both(spread(_ZERO))
+    red, green, blue = nothing, nothing, nothing
+    for i in range(np.uint64(0), np.uint64(len(light)), np.uint64(LIGHT)):
         tu, tv, tw = light[i] - pu, light[i + _ONE] - pv, light[i + np.uint64(2)] + pw
         facing = times_plus(nu, tu, times_plus(nv, tv, nw * tw))
         square = times_plus(tu, tu, times_plus(tv, tv, tw * tw))
@@ -377,15 +385,7 @@ def _light(quick, sheet, x, y, u, v, limits):
         red = times_plus(shine, light[i + np.uint64(3)], red)
         green = times_plus(shine, light[i + np.uint64(4)], green)
         blue = times_plus(shine, light[i + np.uint64(5)], blue)
-        nearness = times_plus(rough_length, light[i + np.uint64(6)], nearness)
-    off = times_plus(rough * size, longest, flat) * coarse
-    error = times_plus(nearness, np.float32(quick.far), np.float32(quick.rounding))
-    error = times_plus(times_plus(nearness, unit * size, np.float32(quick.weight)), off, error)
-    red, green, blue = red * r, green * g, blue * b
-    sure = (apart(red, green, blue) < times_plus(-error * size, greater(greater(r, g), b), _BORDER)) & (
-        disc > size2 * rim
-    )
-    return bytes_of(red, green, blue), sure
+    return (red * r, green * g, blue * b), rough * size, off
 
 
 @borrowing

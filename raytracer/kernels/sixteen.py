@@ -316,16 +316,39 @@ def _halves(builder, lanes):
 
 @intrinsic
 def store_table(typing, table, row, a, b, c, d, e, f, g, h):
-    """Eight lanes each as the columns of rows `row` to `row` + 7 of a flat float32 table of eight columns."""
+    """Eight lanes each as the columns of rows `row` to `row` + 7 of a flat float32 table of eight columns.
+
+    The first two are rounded to whole numbers, and stored as such: see `beyond`.
+    """
 
     def lower(context, builder, sig, args):
         table, row, *columns = args
-        for i, values in enumerate(_turned(builder, [_halves(builder, column) for column in columns])):
+        halves = [_wholes(builder, column) for column in columns[:2]] + [
+            _halves(builder, column) for column in columns[2:]
+        ]
+        for i, values in enumerate(_turned(builder, halves)):
             place = builder.add(builder.mul(row, ir.Constant(row.type, _COLUMNS)), ir.Constant(row.type, _COLUMNS * i))
             builder.store(values, _address(context, builder, sig.args[0], table, place, values.type), align=4)
         return context.get_dummy_value()
 
     return types.void(table, types.uint64, *[LANES] * _COLUMNS), lower
+
+
+def _wholes(builder, lanes):
+    """The nearest whole numbers, in the place of singles."""
+    lanes = _instruction("llvm.rint")(builder, lanes)
+    return builder.bitcast(builder.fptosi(lanes, ir.VectorType(_INT32, WIDTH)), ir.VectorType(_FLOAT, WIDTH))
+
+
+@intrinsic
+def beyond(typing, numbers, wholes):
+    """How far whole numbers are beyond those that are in the place of singles, as singles, rounded."""
+
+    def lower(context, builder, sig, args):
+        numbers, wholes = args
+        return builder.sitofp(builder.sub(numbers, builder.bitcast(wholes, numbers.type)), wholes.type)
+
+    return wholes(numbers, wholes), lower
 
 
 def _turned(builder, columns):
@@ -358,12 +381,13 @@ def load_two(typing, array, i, j):
 
 @intrinsic
 def two(typing, a, b):
-    """Sixteen times one number, and sixteen times another."""
+    """Sixteen times one number, float32 or int32, and sixteen times another."""
+    kind = NUMBER_PAIRS if a in types.integer_domain else SINGLE_PAIRS
 
     def lower(context, builder, sig, args):
         return _joined(builder, [_spread(builder, number, SIXTEEN) for number in args])
 
-    return SINGLE_PAIRS(types.float32, types.float32), lower
+    return kind(kind.single, kind.single), lower
 
 
 @intrinsic

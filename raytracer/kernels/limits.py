@@ -1,0 +1,71 @@
+"""How far off the colours of a tile may be in single precision, from what its spheres and lights have in common.
+
+           · tile ·
+       ·  ──────────  ·      all that its rays can hit is in a cone about the one through its middle, no nearer to the
+    eye ─────── middle       eye than the nearest sphere and no farther away than the farthest: so no closer to a light
+       ·  ──────────  ·      than these are
+
+The bounds are those of `quick`.
+"""
+
+import numpy as np
+
+from raytracer.kernels.compiler import inlined
+from raytracer.kernels.lanes import smallest_of, spread
+from raytracer.quick import LIGHT, coarseness_of, flatness_of
+from raytracer.twofold import select
+
+_TOO_CLOSE = 64.0  # of how far a light and how large a sphere is: there errors are no longer small
+_ROUGHLY = 1.0 - 2.0**-12  # for rough roots
+_NO_RAY_SO_WIDE = 1.0  # the sine of the angle between a tile's middle and its corners
+
+
+@inlined
+def no_extremes():
+    """Of no spheres: the largest 1 / w, the largest radius, the smallest depth and the largest."""
+    return spread(0.0), spread(0.0), spread(np.inf), spread(0.0)
+
+
+@inlined
+def widened(extremes, listed, blur, radius, depth):
+    """The extremes, in each of eight lanes, after another eight spheres, or those of them that are listed."""
+    largest_blur, largest, nearest, farthest = extremes
+    return (
+        select(listed & (blur > largest_blur), blur, largest_blur),
+        select(listed & (radius > largest), radius, largest),
+        select(listed & (depth < nearest), depth, nearest),
+        select(listed & (depth > farthest), depth, farthest),
+    )
+
+
+@inlined
+def limits_of(quick, tile, longest, extremes):
+    """How far off colours are, (A·ρ + B) · c₁ times a sphere's colour, where ρ = w / √disc; and for which ρ that is so.
+
+    `longest` is the length of the tile's longest ray, in pixels.
+    """
+    blurs, radii, depths, farthest = extremes
+    blur, radius, depth = -smallest_of(-blurs), -smallest_of(-radii), (smallest_of(depths), -smallest_of(-farthest))
+    s = longest / quick.focus
+    weight, error = quick.weight, quick.rounding
+    for i in range(0, len(quick.lights), LIGHT):
+        x, y, z, strength = quick.lights[i], quick.lights[i + 1], quick.lights[i + 2], quick.lights[i + 6]
+        nearness = _nearness(quick, tile, s, np.float64(x), np.float64(y), np.float64(z), radius, depth)
+        weight, error = weight + strength * (radius * nearness), error + strength * (quick.far * nearness)
+    rest = (weight * flatness_of(quick.parts, 0.0, s) + error) / coarseness_of(quick.parts, 0.0, s, quick.focus, 0.0)
+    coarsest = coarseness_of(quick.parts, blur, s, quick.focus, quick.widest)
+    return np.float32(weight * longest), np.float32(rest), np.float32(_ROUGHLY / (4.0 * np.sqrt(coarsest) * longest))
+
+
+@inlined
+def _nearness(quick, tile, s, x, y, z, radius, depth):
+    """1 by the least distance of a light, in the camera's axes, from what a tile shows; infinite if it is too close."""
+    u, v = 0.5 * (tile.left + tile.right) - quick.middle_x, quick.middle_y - 0.5 * (tile.top + tile.bottom)
+    length2, away2 = u * u + v * v + quick.focus * quick.focus, x * x + y * y + z * z
+    half2 = (0.5 * (tile.right - tile.left) + 1.0) ** 2 + (0.5 * (tile.bottom - tile.top) + 1.0) ** 2
+    sine2, along, away = half2 / length2, (x * u + y * v - z * quick.focus) / np.sqrt(length2), np.sqrt(away2)
+    distance = max(depth[0] - radius - away, away - (depth[1] + radius) * s)
+    if sine2 < _NO_RAY_SO_WIDE:
+        across = away if along < 0.0 else np.sqrt(max(away2 - along * along, 0.0))
+        distance = max(distance, across * np.sqrt(1.0 - sine2) - max(along, 0.0) * np.sqrt(sine2))
+    return 1.0 / distance if distance * _TOO_CLOSE > away + radius else np.inf
