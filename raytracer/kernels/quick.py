@@ -53,6 +53,7 @@ from raytracer.kernels.sixteen import (
     rough_inverse_root,
     rows_of_block,
     sixteen,
+    smaller_size,
     spread_rows,
     store_halves,
     store_table,
@@ -85,7 +86,7 @@ _MIDDLE, _MIDDLE_Y = TILE_WIDTH // 2, TILE_HEIGHT // 2
 _ONE, _SIXTEEN = np.uint64(1), np.uint64(SIXTEEN)
 _BORDER = np.float32(0.5 - 5.0 / ONE_BYTE)  # of two bytes, but for what roundings at the end add
 _ZERO, _HALF, _UNIT, _THREE = np.float32(0.0), np.float32(0.5), np.float32(1.0), np.float32(3.0)
-_STEP, _LARGEST_K = np.float32(SIDE), np.float32(1.31)  # of a sphere, by that of its middle
+_STEP, _LARGEST_K = np.float32(SIDE), 1.31  # of a sphere, by that of its middle
 
 
 def _paint_tile(view, slow, bins, tile, scratch, doubts, paints, out):
@@ -112,19 +113,20 @@ def _draw_all(view, bins, first, end, tile, paints, sheet):
         store(sheet.depth, p, spread(np.float32(np.inf)))
         store(sheet.number, p, sixteen(0))
     store(sheet.table, 0, spread(_ZERO))
-    tie, extremes, s = _ZERO, no_extremes(), _longest(paints.quick, tile) / paints.quick.focus
+    tie, extremes, s = 0.0, no_extremes(), _longest(paints.quick, tile) / paints.quick.focus
     for at in range(first, end, WIDTH):
         count, row = min(WIDTH, end - at), np.uint64(at - first)
         unfit, near, blur, radius, depth = look(view, bins, np.uint64(at), row, tile, s, paints, sheet)
         if bits_of(unfit) & ((1 << count) - 1):
             return False, extremes
         listed = mask_of((1 << count) - 1)
-        tie = max(tie, np.float32(_largest(select(listed, near, 0.0))))
+        tie = max(tie, _largest(select(listed, near, 0.0)))
+        over_tie = np.float32(1.0 / tie)
         extremes = widened(extremes, listed, blur, radius, depth)
         for j in range(np.uint64(0), np.uint64(count)):
             place = np.uint64(at) + j
             fetch(view, sphere_of(bins.entries[place + np.uint64(AHEAD)]))
-            draw(bins.entries[place], np.int32(row + j + _ONE), j, tie, sheet)
+            draw(bins.entries[place], np.int32(row + j + _ONE), j, over_tie, sheet)
     return True, extremes
 
 
@@ -173,6 +175,7 @@ def _look(view, bins, at, row, tile, s, paints, sheet):
     store_halves(batch, 96, depth * v * -pixel)
     store_halves(batch, 104, -0.5 * radius)
     store_halves(batch, 112, 4.0 * error * m)
+    store_halves(batch, 120, (4.0 / _LARGEST_K) * error * over)
     if shades:
         parts = np.float64(quick.parts)
         size, scale = rho * (quick.focus * parts), (255.0 / parts) * blur
@@ -186,7 +189,7 @@ def _look(view, bins, at, row, tile, s, paints, sheet):
     return unfit, near_of(rho, error), blur, radius, depth
 
 
-def _draw(entry, number, j, tie, sheet):
+def _draw(entry, number, j, over_tie, sheet):
     """Draw the sphere of an entry, number j of the eight that were looked at."""
     b, eight = sheet.batch, np.uint64(8)
     start, stop, high, low = corners_of(entry)
@@ -194,7 +197,7 @@ def _draw(entry, number, j, tie, sheet):
     middle, e1, e2, xx = b[np.uint64(32) + j], b[np.uint64(40) + j], b[np.uint64(48) + j], b[np.uint64(56) + j]
     xy, yy, k0, k1 = b[np.uint64(64) + j], b[np.uint64(72) + j], b[np.uint64(80) + j], b[np.uint64(88) + j]
     k2, half, rim = b[np.uint64(96) + j], b[np.uint64(104) + j], b[np.uint64(112) + j]
-    own, close = sixteen(number), _LARGEST_K * k0 * tie
+    own, by_rim = sixteen(number), b[np.uint64(120) + j] * over_tie
     left, right = start // SIDE, (stop + SIDE - 1) // SIDE
     lines = (low - high + SIDE - 1) // SIDE
     top = min(high, TILE_HEIGHT - SIDE * lines)
@@ -212,7 +215,7 @@ def _draw(entry, number, j, tie, sheet):
             store(sheet.depth, p, blend(wins, k, best))
             store(sheet.number, p, blend(wins, own, load_numbers(sheet.number, p)))
             if certain:
-                unsure = (abs(disc) <= rim) | (abs(k - best) <= close)
+                unsure = smaller_size(disc, (k - best) * by_rim) <= rim  # also where k is not a number
                 if any_of(unsure):
                     _doubt(sheet, p, bits_of(unsure))
             shift += _STEP

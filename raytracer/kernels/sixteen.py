@@ -151,8 +151,9 @@ def _on_sixteen(instruction, result, *flags):
     return call
 
 
-_NEAREST, _AS_IT_IS, _LARGEST_SIZE = 0, 4, 11
+_NEAREST, _AS_IT_IS, _SMALLEST_SIZE, _LARGEST_SIZE = 0, 4, 10, 11
 _rest = _on_sixteen("reduce.ps", SINGLES.vector, _NEAREST, _AS_IT_IS)
+_smaller = _on_sixteen("range.ps", SINGLES.vector, _SMALLEST_SIZE, _AS_IT_IS)
 _larger = _on_sixteen("range.ps", SINGLES.vector, _LARGEST_SIZE, _AS_IT_IS)
 _rounded = _on_sixteen("cvtps2dq", NUMBERS.vector, _AS_IT_IS)
 
@@ -167,14 +168,20 @@ def rest(typing, x):
     return x(x), _by_sixteens("avx512dq", _rest, exactly)
 
 
-@intrinsic
-def larger_size(typing, a, b):
-    """The larger of |a| and |b|; if one is not a number, the other."""
+def _size(choose, by_sixteens):
+    """Of the sizes of two the one that is chosen."""
 
-    def exactly(builder, *args):
-        return _instruction("llvm.maxnum")(builder, *[_instruction("llvm.fabs")(builder, arg) for arg in args])
+    def make(typing, a, b):
+        def exactly(builder, *args):
+            return _instruction(f"llvm.{choose}")(builder, *[_instruction("llvm.fabs")(builder, arg) for arg in args])
 
-    return a(a, b), _by_sixteens("avx512dq", _larger, exactly)
+        return a(a, b), _by_sixteens("avx512dq", by_sixteens, exactly)
+
+    return make
+
+
+smaller_size = intrinsic(_size("minnum", _smaller))  # of |a| and |b|; if one is not a number, the other
+larger_size = intrinsic(_size("maxnum", _larger))
 
 
 def _numbers_of(singles):
