@@ -290,6 +290,7 @@ class Tiles(NamedTuple):
     first: int
     last: int  # excluded
     own: int  # the run of the thread that asks
+    bell: np.ndarray  # int64 (1,), for those who linger: see `pool`
 
 
 class Scratch(NamedTuple):

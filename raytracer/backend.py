@@ -13,6 +13,7 @@ from threading import Lock
 from types import ModuleType
 
 from raytracer import machine_code, plain
+from raytracer.pool import linger_by
 
 _PRICE = 0.5  # seconds to load the compiler and what it has compiled before
 _PRICE_OF_COMPILING = 6.0  # seconds, if it has compiled nothing before
@@ -34,7 +35,10 @@ def load() -> ModuleType:
     global _loaded
     with _loading:
         if _loaded is None:
-            _loaded = import_kernels() or plain
+            kernels = import_kernels()
+            if kernels is not None:
+                linger_by(kernels)
+            _loaded = kernels or plain
         return _loaded
 
 

@@ -5,6 +5,10 @@ locks: a twentieth of a millisecond less at each end of a picture.
 
 Linux often wakes a thread on the core of whoever wakes it, where both then take turns for longer than a picture takes,
 beside a core that is idle. So they are kept off that core.
+
+To wake a thread takes a tenth of a millisecond, and as much again if it wants the interpreter while another has it. So
+once they have done something, threads linger until the next `share`, for a moment, if there are the kernels to do it
+without the interpreter: until a bell rings, as soon as the caller has let go of that.
 """
 
 from __future__ import annotations
@@ -17,10 +21,14 @@ from functools import cache, partial
 from itertools import count
 from queue import SimpleQueue
 from threading import Thread, get_native_id
-from time import sleep
+from types import ModuleType
 from typing import TypeVar
 
-_LOOKS = 200  # while the others are nearly done: to be woken takes longer
+import numpy as np
+
+BELL = np.zeros(1, np.int64)
+_TURNS = 60_000  # a millisecond, about: more than it takes to begin with the next picture
+_kernels: ModuleType | None = None
 
 Job = TypeVar("Job")
 Done = TypeVar("Done")
@@ -32,11 +40,18 @@ def cores() -> int:
     return os.cpu_count() or 1
 
 
+def linger_by(kernels: ModuleType) -> None:
+    """Let threads linger from now on."""
+    global _kernels
+    _kernels = kernels
+
+
 class _Task:
     """Work for whichever thread is idle first, unless it is called off before."""
 
     def __init__(self, work: Callable[[], object]) -> None:
         self._work, self._claims, self._end = work, count(), SimpleQueue[BaseException | None]()
+        self.ended = np.zeros(1, np.int64)
 
     def claim(self) -> bool:
         """Whether it is the caller's now, to do it or to call it off: the first one's, whatever threads there are."""
@@ -55,12 +70,9 @@ class _Task:
         interrupted: BaseException | None = None
         while True:
             try:
-                for _ in range(_LOOKS):
-                    if not self._end.empty():
-                        break
-                    sleep(0)
-                error = self._end.get()
-                return interrupted or error
+                if _kernels is not None:
+                    _kernels.has_ended(self.ended, _TURNS)
+                return interrupted or self._end.get()
             except KeyboardInterrupt as interrupt:
                 interrupted = interrupt
 
@@ -68,9 +80,13 @@ class _Task:
 def _help(tasks: SimpleQueue[_Task]) -> None:
     while True:
         task = tasks.get()
-        if task.claim():
+        ended = task.ended
+        mine = task.claim()
+        if mine:
             task.do()
         del task  # and all that it holds, while there is nothing to do
+        if mine and _kernels is not None:
+            _kernels.linger(ended, BELL, _TURNS)
 
 
 class _Helpers:
@@ -80,12 +96,19 @@ class _Helpers:
         self.tasks = SimpleQueue[_Task]()
         threads = [
             Thread(target=_help, args=(self.tasks,), name=f"raytracer_{number}", daemon=True)
-            for number in range(cores())
+            for number in range(max(1, cores() - 1))
         ]
         for thread in threads:
             thread.start()
         self._ids = [thread.native_id for thread in threads if thread.native_id is not None]
         self._allowed: set[int] | None = None  # the cores that they are kept to
+
+    def start(self, tasks: list[_Task], rings: bool) -> None:
+        self.make_way()
+        for task in tasks:
+            self.tasks.put(task)
+        if not rings:
+            BELL[0] += 1
 
     def make_way(self) -> None:
         """Keep them off the core of the thread that calls, if it may run on others and the system tells which it is."""
@@ -132,11 +155,13 @@ def share(
     work: Callable[[Job, int], Done],
     threads: int | None = None,
     finished: Callable[[Done], object] | None = None,
+    rings: bool = False,
 ) -> None:
     """Do work(job, worker) for all jobs, in about their order, on so many threads (default: one a core).
 
     The calling thread is one of them, and worker 0. It is also the one that calls finished(result), soon after a job.
-    The first exception ends it all, once the jobs that are being done have ended, and is raised.
+    The first exception ends it all, once the jobs that are being done have ended, and is raised. `rings` says that work
+    rings the bell, in a kernel.
     """
     workers = max(1, min(threads or cores(), len(jobs)))
     if workers == 1:
@@ -161,10 +186,7 @@ def share(
 
     others = [_Task(partial(toil, worker)) for worker in range(1, workers)]
     try:
-        helpers = _helpers()
-        helpers.make_way()
-        for task in others:
-            helpers.tasks.put(task)
+        _helpers().start(others, rings)
         toil(0)
     finally:
         failed = True  # if it was interrupted

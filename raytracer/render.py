@@ -127,8 +127,13 @@ def share_bands(tracer: Eye | Screen, plan: Plan, watch: Watch, work: Callable[[
     share_pieces(tracer.bands(plan.shading), watch, 1, work)
 
 
-def share_pieces(bands: list[slice], watch: Watch, pieces: int, work: Callable[[slice, int], slice]) -> None:
-    """The same for any bands, so many times each: those who are at work on one share what there is to do."""
+def share_pieces(
+    bands: list[slice], watch: Watch, pieces: int, work: Callable[[slice, int], slice], rings: bool = False
+) -> None:
+    """The same for any bands, so many times each: those who are at work on one share what there is to do.
+
+    `rings` as in `pool.share`.
+    """
     left = {rows.start: pieces for rows in bands}
 
     def one(rows: slice, worker: int) -> tuple[int, slice]:
@@ -144,7 +149,7 @@ def share_pieces(bands: list[slice], watch: Watch, pieces: int, work: Callable[[
             if watch.progress is not None:
                 watch.progress(watch.done, watch.rounds * len(bands), rows)
 
-    share([rows for rows in bands for _ in range(pieces)], one, watch.threads, tell)
+    share([rows for rows in bands for _ in range(pieces)], one, watch.threads, tell, rings)
 
 
 def _paint(easel: Easel, watch: Watch) -> None:
@@ -157,7 +162,7 @@ def _paint(easel: Easel, watch: Watch) -> None:
         easel.paint(tiles[rows.start], worker)
         return rows
 
-    share_pieces(bands, watch, screen.workers(shading), paint)
+    share_pieces(bands, watch, screen.workers(shading), paint, rings=True)
     easel.finish(*range(len(screen.desks)))
 
 

@@ -59,7 +59,7 @@ from raytracer.glance import make_glance
 from raytracer.lookup import light_cells, reach_of, tree_of
 from raytracer.mirrors import NO_MIRRORS, see_mirrors
 from raytracer.plan import Plan
-from raytracer.pool import cores, share
+from raytracer.pool import BELL, cores, share
 from raytracer.quick import make_quick, packed
 from raytracer.scene import Camera, Colour, Light, Materials, Scene, Triangles
 from raytracer.settle import Bundle, Index, Targets, known_in_integers, polish, settled
@@ -175,7 +175,7 @@ class Screen(NamedTuple):
         height, across = self.kernels.TILE_HEIGHT, self.bins.columns
         first, count = rows.start // height * across, -(-(rows.stop - rows.start) // height) * across
         start, stop, _ = columns.indices(count)
-        return Tiles(np.zeros(APART * len(self.desks), np.int64), first + start, first + stop, 0)
+        return Tiles(np.zeros(APART * len(self.desks), np.int64), first + start, first + stop, 0, BELL)
 
     def hits(self, rows: slice, worker: int = 0, polished: bool = False) -> Hits:
         """What the rays of these rows, cut between tiles, hit first: as `Eye.hits`."""
@@ -246,7 +246,7 @@ class Screen(NamedTuple):
         What is left of them `doubtful` tells.
         """
         kernel, (scratch, doubts) = getattr(self.kernels, painter), self.desks[worker]
-        tiles = Tiles(tiles.taken, tiles.first, tiles.last, worker % len(self.desks))
+        tiles = tiles._replace(own=worker % len(self.desks))
         while not kernel(self.view, self.slow, self.bins, tiles, scratch, doubts, paints, out):
             yield from self.doubtful(worker)
 
@@ -380,6 +380,7 @@ _NO_PAINTS = Paints(
 )
 
 
+_NOBODY = np.zeros(1, np.int64)  # a bell that nobody hears
 _NO_SPHERES = np.empty(0)
 _NO_BOXES = np.empty((0, 4), np.int32)
 _NO_IDS = np.empty(0, np.int32)
@@ -516,7 +517,7 @@ def _sort(
     cuts = [spheres * worker // workers // 8 * 8 for worker in range(workers)] + [spheres]
     counts = workspace.zeros((workers + 1) * columns * rows, np.int64, "counts").reshape(workers + 1, -1)
     starts = workspace.array(columns * rows + 1, np.int64, "starts")
-    parts = [_NO_PART] * (workers + 1)
+    parts, bell = [_NO_PART] * (workers + 1), BELL if workers > 1 else _NOBODY
 
     def bound(part: int, worker: int) -> None:
         first, last = cuts[part], cuts[part + 1]
@@ -525,7 +526,19 @@ def _sort(
 
         def find(room: Records) -> tuple[int, int]:
             found: tuple[int, int] = kernels.bound(
-                glance, lens, view.eye, view.reach, view.kappa, view.balls, first, last, columns, room, slow, boxes
+                glance,
+                lens,
+                view.eye,
+                view.reach,
+                view.kappa,
+                view.balls,
+                first,
+                last,
+                columns,
+                room,
+                slow,
+                boxes,
+                bell,
             )
             return found
 
@@ -541,9 +554,9 @@ def _sort(
         kernels.count(records, end, counts[part])
 
     def fill(part: int, worker: int) -> None:
-        kernels.fill(parts[part].records, parts[part].end, counts[part], entries)
+        kernels.fill(parts[part].records, parts[part].end, counts[part], entries, bell)
 
-    share(list(range(workers)), bound, threads)
+    share(list(range(workers)), bound, threads, rings=True)
     if len(facet_boxes):
         boxes, first = facet_boxes.reshape(-1), view.first_facet
         count(workers, lambda room: (kernels.record_boxes(boxes, first, columns, room), 0), 2 * len(facet_boxes))
@@ -552,7 +565,7 @@ def _sort(
     middles[:] = counts[workers]
     entries = workspace.array(int(starts[-1]) + _SPARE, np.uint64, "entries")
     entries[int(starts[-1]) :] = 0
-    share(list(range(workers)), fill, threads)
+    share(list(range(workers)), fill, threads, rings=True)
     if len(facet_boxes):
         fill(workers, 0)
     return Bins(starts, entries, middles, columns), np.concatenate([part.slow for part in parts])

@@ -3,9 +3,13 @@
 import os
 import threading
 
+import numpy as np
 import pytest
 
+from raytracer import backend, plain
 from raytracer.pool import share
+
+KERNELS = backend.load()
 
 
 @pytest.mark.parametrize("threads", [1, 2, 5, None])
@@ -64,6 +68,36 @@ def test_a_caller_that_keeps_to_one_core_does_not_keep_the_helpers_there():
     finally:
         os.sched_setaffinity(0, allowed)
     assert len(helper_cores()[0]) == len(allowed) - 1
+
+
+@pytest.mark.skipif(KERNELS is plain, reason="numba is not installed")
+def test_who_lingers_says_first_that_the_task_has_ended_and_goes_when_the_bell_rings():
+    ended, bell = np.zeros(1, np.int64), np.zeros(1, np.int64)
+    assert not KERNELS.has_ended(ended, 10)
+    thread = threading.Thread(target=KERNELS.linger, args=(ended, bell, 1 << 40), daemon=True)
+    thread.start()
+    assert KERNELS.has_ended(ended, 1 << 40)
+    thread.join(0.05)
+    assert thread.is_alive()
+    bell[0] += 1
+    thread.join(5)
+    assert not thread.is_alive()
+    KERNELS.linger(ended, bell, 10)  # and not for ever
+
+
+@pytest.mark.skipif(KERNELS is plain, reason="numba is not installed")
+@pytest.mark.parametrize("rings", [True, False])
+def test_helpers_that_linger_help_again(rings):
+    """Whoever says that work rings the bell and does not only waits for the helpers a little longer."""
+    helped, both = [], threading.Barrier(2, timeout=5)
+
+    def work(job, worker):
+        both.wait()
+        helped.append(worker)
+
+    for _ in range(20):
+        share([0, 1], work, 2, rings=rings)
+    assert sorted(helped) == [0] * 20 + [1] * 20
 
 
 def test_no_jobs_are_no_trouble():

@@ -1,11 +1,13 @@
 """Single precision where it is certain: the bytes are float64's, and the bounds that say so hold."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from raytracer import backend, make_plan, plain
+from raytracer.arrays import Tile
 from raytracer.bench import spread
 from raytracer.plan import Plan
 from raytracer.quick import U, coarseness_of, error_of, flatness_of, make_quick, near_of
@@ -15,6 +17,8 @@ from raytracer.screen import make_canvas, make_paints, open_screen
 
 pytestmark = pytest.mark.skipif(backend.why_no_compiler() != "", reason="numba is not installed")
 KERNELS = backend.load()
+if backend.why_no_compiler() == "":
+    from raytracer.kernels.limits import nearness_of
 SIZE = 203, 150
 
 
@@ -90,8 +94,8 @@ def test_without_its_bounds_single_precision_is_wrong():
     assert 0 < wrong.any(axis=2).sum() < 640 * 360 // 100
 
 
-def quick_of(scene: Scene):
-    plan, diffuse = make_plan(scene, "diffuse", *SIZE), scene.materials.diffuse_range
+def quick_of(scene: Scene, size=SIZE):
+    plan, diffuse = make_plan(scene, "diffuse", *size), scene.materials.diffuse_range
     return make_quick(plan.raster, plan.lights, 0, diffuse, (0.0, 0.0, 0.0), (1.0, 2.0, 3.0))
 
 
@@ -146,12 +150,48 @@ def test_the_discriminant_is_no_further_off_than_its_bound():
 def test_what_the_bounds_grow_with():
     few, many = np.float64(0.01), np.float64(10.0)
     assert U < error_of(2.0, few, few) < error_of(2.0, few, many) < error_of(4.0, few, many)
-    coarse = [coarseness_of(*numbers, 900.0, 3.0) for numbers in ((few, few, 1.2), (few, many, 1.2), (many, many, 1.2))]
-    assert U < coarse[0] < coarse[1] < coarse[2] < coarseness_of(many, many, 1.6, 900.0, 3.0)
-    assert 1.0 < flatness_of(1.6) < flatness_of(1.2) < 2.0
+    finely, roughly = 2.0**22, 2.0**16
+    numbers = (finely, few, 1.2), (finely, many, 1.2), (roughly, many, 1.2), (roughly, many, 1.6)
+    coarse = [coarseness_of(*some, 900.0, 3.0) for some in numbers]
+    assert 7 * U < coarse[0] < coarse[1] < coarse[2] < coarse[3]
+    assert 7 * U < flatness_of(*numbers[0]) < flatness_of(*numbers[1]) < flatness_of(*numbers[2])
     assert near_of(few, U) < near_of(10 * few, U) < near_of(10 * few, 100 * U)
     for error in 2.0 ** np.arange(-24.0, -10.0):  # twice the sum that the text derives
         assert near_of(0.1, error) >= 2 * (2.5 * 0.1 * (np.sqrt(error) / 4 + 8 * U) + 24 * U)
+
+
+def test_places_are_whole_numbers_that_int32_holds():
+    scene = spread(3, seed=1)
+    for width, height, fov in ((64, 48, 60.0), (1920, 1080, 60.0), (1920, 1080, 2.0), (7680, 4320, 25.0)):
+        quick = quick_of(replace(scene, camera=replace(scene.camera, fov=fov)), (width, height))
+        assert quick.usable
+        bits = np.log2(quick.parts)
+        assert bits == round(bits)
+        farthest = 128 + 1.05 * np.sqrt(quick.widest) * quick.focus / 4
+        assert 2.0**28 < farthest * quick.parts < 2.0**31
+
+
+def test_no_light_is_closer_to_what_a_tile_shows_than_its_bound():
+    """Points of random rays of random tiles, between the nearest sphere and the farthest."""
+    rng = np.random.default_rng(11)
+    known = 0
+    for _ in range(300):
+        focus, (middle_x, middle_y) = 10.0 ** rng.uniform(1, 4), rng.uniform(100, 1000, 2)
+        left, top = (128 * rng.integers(0, 15)).item(), (32 * rng.integers(0, 30)).item()
+        tile = Tile(0, left, top, left + 128, top + 32)
+        quick = SimpleNamespace(focus=focus, middle_x=middle_x, middle_y=middle_y)
+        u = np.append(rng.uniform(left, left + 127, 200), [left, left + 127, left]) - middle_x
+        v = middle_y - np.append(rng.uniform(top, top + 31, 200), [top, top + 31, top + 31])
+        rays = np.column_stack([u, v, np.full(len(u), -focus)]) / focus
+        near, radius = 10.0 ** rng.uniform(-1, 2), 10.0 ** rng.uniform(-2, 0)
+        far, depths = near + 10.0 ** rng.uniform(-1, 2), rng.uniform(0, 1, len(u))
+        points = rays * np.maximum(near - radius + (far - near + 2 * radius) * depths, 0.0)[:, None]
+        light = rng.choice([rng.normal(size=3) * 30, points[0] + rng.normal(size=3) * 10.0 ** rng.uniform(-2, 1)])
+        longest = np.linalg.norm(rays, axis=1).max()
+        bound = 1.0 / nearness_of.py_func(quick, tile, longest, *light, radius, (near, far))
+        assert np.linalg.norm(points - light, axis=1).min() >= bound
+        known += bound > 0.0
+    assert known > 150
 
 
 def full_tiles() -> Scene:

@@ -26,6 +26,7 @@ with cache_named_after_sources():
     from raytracer.kernels.trace import fine_rays, nearest_given, nearest_twofold, polish, refine_given
     from raytracer.kernels.usual import usual_eye, usual_given
     from raytracer.kernels.visibility import STRIDE, candidates
+    from raytracer.kernels.waiting import has_ended, linger
     from raytracer.kernels.whole import mean_of_blocks, paint_depth, paint_edges, range_of
 
 __all__ = [
@@ -49,6 +50,8 @@ __all__ = [
     "find_fine_hits",
     "find_hits",
     "fine_rays",
+    "has_ended",
+    "linger",
     "mean_of_blocks",
     "nearest_given",
     "nearest_in_tree",

@@ -41,6 +41,7 @@ from raytracer.kernels.sixteen import (
     times_plus,
     whole_numbers,
 )
+from raytracer.kernels.waiting import ring
 from raytracer.quick import FARTHEST, NEAREST
 from raytracer.twofold import select
 
@@ -55,13 +56,14 @@ _ZERO, _UNIT, _FOUR = np.float32(0.0), np.float32(1.0), np.float32(4.0)
 
 
 @borrowing
-def bound(near, lens, eye, reach, kappa, balls, first, last, columns, records, slow, boxes):
+def bound(near, lens, eye, reach, kappa, balls, first, last, columns, records, slow, boxes, bell):
     """Records of spheres first to last − 1, first being a multiple of 8, and in `slow` which of them are slow.
 
     Returns how many records there are, or would be if there was room for them and SIXTEEN more, and how many slow ones.
     balls has room for whole eights, slow for all of those spheres, boxes for 64 numbers; columns is how many tiles lie
     side by side.
     """
+    ring(bell)
     end, slows, i = 0, 0, np.uint64(first)
     while i < last:
         odd = np.int32(_ALL)
@@ -226,8 +228,9 @@ def begin(counts, starts):
 
 
 @borrowing
-def fill(records, end, places, entries):
+def fill(records, end, places, entries, bell):
     """Put records into the lists of their tiles; `places` is where each list goes on."""
+    ring(bell)
     for k in range(np.uint64(end)):
         tile = np.uint64(records.tiles[k])
         place = np.uint64(places[tile])

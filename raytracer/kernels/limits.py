@@ -50,7 +50,7 @@ def limits_of(quick, tile, longest, extremes):
     weight, error = quick.weight, quick.rounding
     for i in range(0, len(quick.lights), LIGHT):
         x, y, z, strength = quick.lights[i], quick.lights[i + 1], quick.lights[i + 2], quick.lights[i + 6]
-        nearness = _nearness(quick, tile, s, np.float64(x), np.float64(y), np.float64(z), radius, depth)
+        nearness = nearness_of(quick, tile, s, np.float64(x), np.float64(y), np.float64(z), radius, depth)
         weight, error = weight + strength * (radius * nearness), error + strength * (quick.far * nearness)
     rest = (weight * flatness_of(quick.parts, 0.0, s) + error) / coarseness_of(quick.parts, 0.0, s, quick.focus, 0.0)
     coarsest = coarseness_of(quick.parts, blur, s, quick.focus, quick.widest)
@@ -58,7 +58,7 @@ def limits_of(quick, tile, longest, extremes):
 
 
 @inlined
-def _nearness(quick, tile, s, x, y, z, radius, depth):
+def nearness_of(quick, tile, s, x, y, z, radius, depth):
     """1 by the least distance of a light, in the camera's axes, from what a tile shows; infinite if it is too close."""
     u, v = 0.5 * (tile.left + tile.right) - quick.middle_x, quick.middle_y - 0.5 * (tile.top + tile.bottom)
     length2, away2 = u * u + v * v + quick.focus * quick.focus, x * x + y * y + z * z

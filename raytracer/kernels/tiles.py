@@ -42,6 +42,7 @@ from raytracer.kernels.quick import (
 from raytracer.kernels.strips import fetch_row, put_pixel, start_of
 from raytracer.kernels.surfaces import ball_of, diffuse_of_any, diffuse_of_spheres, line_of, normal, ray_of
 from raytracer.kernels.visibility import STRIDE, list_doubts, see_tile, see_tile_unchecked
+from raytracer.kernels.waiting import ring
 from raytracer.shading import to_byte
 from raytracer.twofold import select
 
@@ -53,6 +54,7 @@ ROOM = 3 * TILE_WIDTH * TILE_HEIGHT + FEW_LATE
 def _paint(view, slow, bins, tiles, scratch, doubts, paints, out):
     """Paint tiles, as long as there are any and there is room for doubts; returns whether all are done, or taken."""
     align_stack()
+    ring(tiles.bell)
     if len(doubts) - doubts[0] <= ROOM:
         return False
     number = _take(tiles)
