@@ -35,10 +35,7 @@ def load() -> ModuleType:
     global _loaded
     with _loading:
         if _loaded is None:
-            kernels = import_kernels()
-            if kernels is not None:
-                linger_by(kernels)
-            _loaded = kernels or plain
+            _loaded = import_kernels() or plain
         return _loaded
 
 
@@ -73,7 +70,9 @@ def import_kernels() -> ModuleType | None:
     """The kernels, without using them from now on; None if their compiler cannot be loaded."""
     global _fault
     try:
-        return import_module("raytracer.kernels")
+        kernels = import_module("raytracer.kernels")
     except ImportError as error:
         _fault = why_no_compiler() or f"numba cannot be loaded ({error})"
         return None
+    linger_by(kernels)
+    return kernels

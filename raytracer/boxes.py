@@ -16,6 +16,7 @@ is added for them, for frames that magnify errors by no more than `camera.invers
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import lru_cache
 from math import frexp, hypot, inf, ldexp, nan, sqrt
 from typing import NamedTuple
@@ -65,9 +66,8 @@ class Lens(NamedTuple):
 
 def _cone(raster: Raster) -> tuple[Row, float, float]:
     """The axis of a cone that holds all rays of a picture, and cos and sin of its angle, whose widest are corners."""
-    across, up = raster.ends()
-    corners = directions_of(eye_grid(raster), across[[0, 0, -1, -1]], up[[0, -1, 0, -1]])
-    rays = [_unit(row) for row in np.array(corners).T.tolist()]
+    (across, up), grid = raster.ends(), eye_grid(raster)
+    rays = [_unit(directions_of(grid, x, y)) for x in across for y in up]
     axis = _unit([sum(column) for column in zip(*rays, strict=True)])
     cos = min(inner(*axis, *ray) for ray in rays)
     if not cos > 0.0:  # wider than half of all directions: the sum of both angles may be more than half a turn
@@ -75,7 +75,7 @@ def _cone(raster: Raster) -> tuple[Row, float, float]:
     return axis, cos, sqrt(max(0.0, 1.0 - cos * cos))
 
 
-def _unit(vector: list[float]) -> Row:
+def _unit(vector: Iterable[float]) -> Row:
     x, y, z = vector
     length = hypot(x, y, z)
     return (x / length, y / length, z / length) if 0.0 < length < inf else (nan, nan, nan)

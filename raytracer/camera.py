@@ -30,6 +30,7 @@ SAMPLINGS = {"corner": 0, "centre": 1}  # what is added to 2x and 2y
 
 _LARGEST_SIDE = (1 << 31) - 1  # that a PNG can name
 _CROOKED = 2.0**-44  # a frame whose vectors are no more than this off unit length and right angles is taken for right
+_CAMERA = Camera()
 _SKEWED = 1e3  # a frame whose inverse magnifies rounding by more than this
 _BAND_TESTS = 1 << 22
 BAND_PIXELS = 1 << 15  # enough to outweigh what a task costs, few enough to stay in a core's cache
@@ -40,6 +41,7 @@ _PI = Decimal("3.141592653589793238462643383279502884197169399375105820974944592
 _DIGITS = 80
 
 
+@lru_cache(maxsize=64)
 def is_right(camera: Camera) -> bool:
     """Whether u, v, w are of length 1, and at right angles."""
     axes = camera.u, camera.v, camera.w
@@ -97,7 +99,7 @@ def _check_camera(camera: Camera) -> None:
     """What the interpreter refuses in a file, for cameras that come from elsewhere."""
     if not (0 < camera.fov < 180 and focal_length(camera.fov) < inf):
         raise ValueError(f"found fov {camera.fov}, expected an angle in degrees above 0 and below 180")
-    if not np.isfinite([camera.eye, camera.u, camera.v, camera.w]).all():
+    if not all(map(isfinite, (*camera.eye, *camera.u, *camera.v, *camera.w))):
         raise ValueError("found a camera with a number that is not finite")
     numbers, _ = _whole_frame(camera)
     if not _inner(numbers[:3], _cross(numbers[3:6], numbers[6:])):
@@ -113,6 +115,11 @@ class Raster(NamedTuple):
     sampling: str
     first_row: int  # where they begin in the picture
     whole_height: int  # of the picture: H above
+
+    @property
+    def of_any_camera(self) -> Raster:
+        """For what the camera does not matter to, and is kept while it moves."""
+        return self._replace(camera=_CAMERA)
 
     def finer(self, times: int) -> Raster:
         """So many columns for each, and as many rows."""
@@ -130,12 +137,12 @@ class Raster(NamedTuple):
         shift = SAMPLINGS[self.sampling]
         return 2 * xs + shift - self.width, self.whole_height - 2 * (ys + self.first_row) - shift
 
-    def ends(self) -> tuple[np.ndarray, np.ndarray]:
-        """U of the first and the last column, V of the first and the last row, of the whole picture: (2,) each."""
-        across, up = self.numerators(
-            np.array([0, self.width - 1]), np.array([0, self.whole_height - 1]) - self.first_row
-        )
-        return across / self.whole_height, up / self.whole_height
+    def ends(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """U of the first and the last column, V of the first and the last row, of the whole picture."""
+        height = self.whole_height
+        left, top = self.numerators(0, -self.first_row)
+        right, bottom = self.numerators(self.width - 1, height - 1 - self.first_row)
+        return (left / height, right / height), (top / height, bottom / height)
 
     def whole_direction(self, x: int, y: int) -> tuple[tuple[int, int, int], int]:
         """D as the language defines it, without rounding: integers, and what they are to be divided by."""
@@ -166,18 +173,24 @@ def _whole_frame(camera: Camera) -> tuple[list[int], int]:
 
 
 @lru_cache(maxsize=8)
+def _columns_and_rows(raster: Raster) -> tuple[np.ndarray, np.ndarray]:
+    """U of each column, V of each row."""
+    across, _ = raster.numerators(np.arange(raster.width), 0)
+    _, up = raster.numerators(0, np.arange(raster.height))
+    return across / raster.whole_height, up / raster.whole_height
+
+
+@lru_cache(maxsize=8)
 def eye_grid(raster: Raster) -> Grid:
     """The rays of a picture, in factors.
 
     U is rounded once, each product once, each of the two sums once: a component of D is within
     4u·(|U u| + |V v| + |d w|) of the truth, and `reach` is the length of the longest vector of such sums.
     """
-    across, _ = raster.numerators(np.arange(raster.width), 0)
-    _, up = raster.numerators(0, np.arange(raster.height))
+    across, up = _columns_and_rows(raster.of_any_camera)
     u, v, d = raster.camera.u, raster.camera.v, focal_length(raster.camera.fov)
-    across, up = across / raster.whole_height, up / raster.whole_height
     back = d * raster.camera.w[0], d * raster.camera.w[1], d * raster.camera.w[2]
-    widest, highest = (np.abs(ends).max() for ends in raster.ends())
+    widest, highest = (max(map(abs, ends)) for ends in raster.ends())
     sizes = [widest * abs(x) + highest * abs(y) + abs(z) for x, y, z in zip(u, v, back, strict=True)]
     a1 = 2.0 * (up * inner(*u, *v) - inner(*u, *back))
     a0 = (up * inner(*v, *v) - 2.0 * inner(*v, *back)) * up + inner(*back, *back)
@@ -201,7 +214,7 @@ def directions(grid: Grid, rows: slice = slice(None), columns: slice = slice(Non
     return directions_of(grid, grid.across[None, columns], grid.up[rows, None])
 
 
-def directions_of(grid: Grid, across: np.ndarray, up: np.ndarray) -> Vectors:
+def directions_of(grid: Grid, across: Number, up: Number) -> tuple[Number, Number, Number]:
     """The directions of the rays with these U and V."""
     x, y, z = (across * u + (up * v - back) for u, v, back in zip(grid.u, grid.v, grid.back, strict=True))
     return x, y, z

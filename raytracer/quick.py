@@ -119,10 +119,10 @@ def make_quick(
     It is not usable for a frame that is crooked, or where lights and colours are beyond single precision.
     """
     camera, (focus, middle_x, middle_y) = raster.camera, in_pixels(raster)
-    across, up = (np.abs(ends).max() / focal_length(camera.fov) for ends in raster.ends())
+    across, up = (max(map(abs, ends)) / focal_length(camera.fov) for ends in raster.ends())
     rows, weight, farthest, darkest = [], 0.0, 0.0, 0.0
     for light in lights:
-        away = light_from_eye(light, camera, unit).tolist()
+        away = light_from_eye(light, camera, unit)
         strength, darkest = max(map(abs, light.colour)), min(darkest, *light.colour)
         weight, farthest = weight + strength, max(farthest, hypot(*away))
         place = (inner(*axis, *away) for axis in (camera.u, camera.v, camera.w))

@@ -14,9 +14,8 @@ float64 is not certain are listed, decided by `settle`, and painted anew.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from functools import lru_cache
-from queue import Empty, Full, LifoQueue
 from types import ModuleType
 from typing import NamedTuple
 
@@ -79,6 +78,7 @@ _WORTH_A_THREAD = 8  # a moment
 _NUMBERS = 1 << 14  # of spheres of a tile, for the blocks that show but one
 _STACK = 8 * 24  # boxes that may wait, eight a level
 _KEPT = 1 << 26  # bytes of a workspace that is kept
+_WORKSPACES = 2  # that are kept, about
 
 _NOT_A_NUMBER_IS_NO_ERROR = np.errstate(all="ignore")
 
@@ -110,19 +110,18 @@ class Workspace:
         return array
 
 
-_idle: LifoQueue[Workspace] = LifoQueue(2)
+_idle: list[Workspace] = []  # threads may take and put them at any time, as that is one step to a list
 
 
 @contextmanager
 def _workspace() -> Iterator[Workspace]:
     try:
-        workspace = _idle.get_nowait()
-    except Empty:
+        workspace = _idle.pop()
+    except IndexError:
         workspace = Workspace()
     yield workspace
-    if workspace.nbytes < _KEPT:
-        with suppress(Full):
-            _idle.put_nowait(workspace)
+    if workspace.nbytes < _KEPT and len(_idle) < _WORKSPACES:
+        _idle.append(workspace)
 
 
 class Desk(NamedTuple):
@@ -262,13 +261,14 @@ class Screen(NamedTuple):
 
     def doubtful(self, *workers: int) -> Iterator[Pixels]:
         """The doubtful pixels that these workers have listed, all together, if there are any."""
-        lists = [self.desks[worker].doubts for worker in workers]
+        lists = [doubts for worker in workers if (doubts := self.desks[worker].doubts)[0]]
+        if not lists:
+            return
         pixels = np.concatenate([doubts[1 : 1 + doubts[0]] for doubts in lists])
-        if pixels.size:
-            for doubts in lists:
-                doubts[0] = 0
-            ys, xs = np.divmod(pixels, self.raster.width)
-            yield Pixels(self, xs, ys)
+        for doubts in lists:
+            doubts[0] = 0
+        ys, xs = np.divmod(pixels, self.raster.width)
+        yield Pixels(self, xs, ys)
 
 
 class Pixels(NamedTuple):
@@ -344,7 +344,7 @@ def make_paints(plan: Plan, screen: Screen) -> Paints:
 @lru_cache(maxsize=8)
 def _lights_from_eye(lights: tuple[Light, ...], camera: Camera, unit: int) -> np.ndarray:
     """See `Paints.lights`."""
-    rows = [(*light_from_eye(light, camera, unit).tolist(), *light.colour) for light in lights]
+    rows = [(*light_from_eye(light, camera, unit), *light.colour) for light in lights]
     return np.array(rows, np.float64).reshape(-1, 6)
 
 
@@ -471,10 +471,15 @@ def _view(raster: Raster, origin: np.ndarray, balls: np.ndarray, material: np.nd
 @lru_cache(maxsize=8)
 def _rays(raster: Raster) -> Grid:
     """With eight columns and one row to spare."""
-    grid = eye_grid(raster)
-    across = np.concatenate([grid.across, np.full(SPARE, grid.across[-1])])
-    up, a1, a0 = (np.append(rows, rows[-1]) for rows in (grid.up, grid.a1, grid.a0))
+    grid, (across, up) = eye_grid(raster), _spare_columns_and_rows(raster.of_any_camera)
+    a1, a0 = (np.append(rows, rows[-1]) for rows in (grid.a1, grid.a0))
     return grid._replace(across=across, up=up, a1=a1, a0=a0)
+
+
+@lru_cache(maxsize=8)
+def _spare_columns_and_rows(raster: Raster) -> tuple[np.ndarray, np.ndarray]:
+    grid = eye_grid(raster)
+    return np.append(grid.across, np.full(SPARE, grid.across[-1])), np.append(grid.up, grid.up[-1])
 
 
 def _with_facets(

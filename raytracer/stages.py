@@ -18,7 +18,7 @@ from raytracer.camera import Raster, Vectors, directions, directions_of, eye_gri
 from raytracer.facets import planes_of
 from raytracer.full import World
 from raytracer.image import to_bytes
-from raytracer.scene import Camera, Colour, Light, Scene
+from raytracer.scene import Camera, Colour, Light, Scene, Vector
 from raytracer.units import scene_units
 
 DUMMY = (0.8, 0.2, 0.3)
@@ -120,8 +120,8 @@ class Block:
     @cached_property
     def world(self) -> World:
         """All shapes and lights, for light that goes on from the hits."""
-        places = [light_from_eye(light, self.scene.camera, self._unit).tolist() for light in self.lights]
-        lights = tuple((tuple(p), light.colour) for p, light in zip(places, self.lights, strict=True))
+        places = [light_from_eye(light, self.scene.camera, self._unit) for light in self.lights]
+        lights = tuple((place, light.colour) for place, light in zip(places, self.lights, strict=True))
         return World(self.scene, lights)
 
     @cached_property
@@ -196,9 +196,12 @@ class Block:
 LIGHT_RANGE = 333  # a power of two: a light farther away than this, in units, is brought nearer, on the same line
 
 
-def light_from_eye(light: Light, camera: Camera, unit: int) -> np.ndarray:
-    """Where a light is as seen from the eye, in units of 2**unit: (3,)."""
-    return np.ldexp(light.position, -unit) - np.ldexp(camera.eye, -unit)
+def light_from_eye(light: Light, camera: Camera, unit: int) -> Vector:
+    """Where a light is as seen from the eye, in units of 2**unit."""
+    place, eye = light.position, camera.eye
+    if unit:
+        place, eye = np.ldexp(place, -unit).tolist(), np.ldexp(eye, -unit).tolist()
+    return place[0] - eye[0], place[1] - eye[1], place[2] - eye[2]
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,6 @@
 """Eye rays in tiles: the same hits and the same bytes as the numpy path, whatever the size, the threads, the memory."""
 
 from dataclasses import replace
-from queue import LifoQueue
 
 import numpy as np
 import pytest
@@ -77,7 +76,7 @@ def test_doubts_that_do_not_fit_their_list_are_decided_on_the_way(monkeypatch):
     scene = interpreter("scenes/hard/08_tied_spheres.cli")
     expected = eye_hits(scene, 200, 200)
     monkeypatch.setattr(screen, "_DOUBTS", KERNELS.ROOM + 2)
-    monkeypatch.setattr(screen, "_idle", screen.LifoQueue(2))
+    monkeypatch.setattr(screen, "_idle", [])
     found = eye_hits(scene, 200, 200)
     np.testing.assert_array_equal(found.index, expected.index)
     np.testing.assert_array_equal(found.t, expected.t)
@@ -181,7 +180,7 @@ def test_boxes_at_a_glance_hold_those_of_float64_and_little_more(camera, more):
 def test_lists_longer_than_expected_are_made_all_the_same(monkeypatch, count):
     scene = spread(count, seed=2)
     expected = drawn(scene, "hit", 700, 400, KERNELS)
-    monkeypatch.setattr(screen, "_idle", LifoQueue(1))
+    monkeypatch.setattr(screen, "_idle", [])
     monkeypatch.setattr(screen, "_SPARE_RECORDS", 0)
     np.testing.assert_array_equal(drawn(scene, "hit", 700, 400, KERNELS), expected)
 
@@ -190,7 +189,7 @@ def test_memory_is_forty_bytes_a_sphere_at_most(monkeypatch):
     scene, few = spread(400_000, seed=1), spread(10, seed=1)
     sizes = []
     for each in (few, scene):
-        monkeypatch.setattr(screen, "_idle", LifoQueue(1))
+        monkeypatch.setattr(screen, "_idle", [])
         with open_screen(each, make_raster(each.camera, 64, 64), KERNELS) as opened:
             sizes.append(opened.workspace.nbytes)
     assert (sizes[1] - sizes[0]) / (len(scene.spheres) - len(few.spheres)) <= 40
