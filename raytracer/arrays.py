@@ -46,6 +46,9 @@ class Rays(NamedTuple):
     reach: np.ndarray
 
 
+_Axis = tuple[float, float, float]
+
+
 class Grid(NamedTuple):
     """The rays of a picture, D = across·u + up·v − back, in factors; D·D = (a2·across + a1)·across + a0."""
 
@@ -58,6 +61,11 @@ class Grid(NamedTuple):
     v: tuple[float, float, float]
     back: tuple[float, float, float]  # d·w
     reach: float  # at least the reach of each ray of the picture
+
+    @property
+    def axes(self) -> tuple[_Axis, _Axis, _Axis]:
+        """u, v and d·w."""
+        return self.u, self.v, self.back
 
 
 class TwofoldRays(NamedTuple):

@@ -23,7 +23,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from raytracer.camera import SAMPLINGS, Raster, directions_of, eye_grid, inverse_frame
+from raytracer.camera import SAMPLINGS, Raster, axes_of, directions_of, inverse_frame
 from raytracer.certified import inner
 from raytracer.twofold import Number, select
 
@@ -66,8 +66,8 @@ class Lens(NamedTuple):
 
 def _cone(raster: Raster) -> tuple[Row, float, float]:
     """The axis of a cone that holds all rays of a picture, and cos and sin of its angle, whose widest are corners."""
-    (across, up), grid = raster.ends(), eye_grid(raster)
-    rays = [_unit(directions_of(grid, x, y)) for x in across for y in up]
+    (across, up), axes = raster.ends(), axes_of(raster.camera)
+    rays = [_unit(directions_of(axes, x, y)) for x in across for y in up]
     axis = _unit([sum(column) for column in zip(*rays, strict=True)])
     cos = min(inner(*axis, *ray) for ray in rays)
     if not cos > 0.0:  # wider than half of all directions: the sum of both angles may be more than half a turn

@@ -23,7 +23,7 @@ import numpy as np
 from raytracer.arrays import Grid, Rays, TwofoldRays
 from raytracer.certified import Three, in_range, inner
 from raytracer.image import check_fits_memory
-from raytracer.scene import Camera
+from raytracer.scene import Camera, Vector
 from raytracer.twofold import Number, Twofold, add, multiply, two_product
 
 SAMPLINGS = {"corner": 0, "centre": 1}  # what is added to 2x and 2y
@@ -102,7 +102,7 @@ def _check_camera(camera: Camera) -> None:
     if not all(map(isfinite, (*camera.eye, *camera.u, *camera.v, *camera.w))):
         raise ValueError("found a camera with a number that is not finite")
     numbers, _ = _whole_frame(camera)
-    if not _inner(numbers[:3], _cross(numbers[3:6], numbers[6:])):
+    if not is_right(camera) and not _inner(numbers[:3], _cross(numbers[3:6], numbers[6:])):
         raise ValueError("found dependent vectors u, v, w in a camera, expected three that point out of one plane")
 
 
@@ -187,14 +187,28 @@ def eye_grid(raster: Raster) -> Grid:
     U is rounded once, each product once, each of the two sums once: a component of D is within
     4u·(|U u| + |V v| + |d w|) of the truth, and `reach` is the length of the longest vector of such sums.
     """
-    across, up = _columns_and_rows(raster.of_any_camera)
-    u, v, d = raster.camera.u, raster.camera.v, focal_length(raster.camera.fov)
-    back = d * raster.camera.w[0], d * raster.camera.w[1], d * raster.camera.w[2]
-    widest, highest = (max(map(abs, ends)) for ends in raster.ends())
-    sizes = [widest * abs(x) + highest * abs(y) + abs(z) for x, y, z in zip(u, v, back, strict=True)]
+    return grid_of(raster, *_columns_and_rows(raster.of_any_camera))
+
+
+def grid_of(raster: Raster, across: np.ndarray, up: np.ndarray) -> Grid:
+    """The rays with these U and V, as `eye_grid`."""
+    u, v, back = axes_of(raster.camera)
     a1 = 2.0 * (up * inner(*u, *v) - inner(*u, *back))
     a0 = (up * inner(*v, *v) - 2.0 * inner(*v, *back)) * up + inner(*back, *back)
-    return Grid(across, up, a1, a0, inner(*u, *u), u, v, back, float(in_range(np.sqrt(_square(*sizes)))))
+    return Grid(across, up, a1, a0, inner(*u, *u), u, v, back, _reach(raster))
+
+
+def axes_of(camera: Camera) -> tuple[Vector, Vector, Vector]:
+    """What rays are made of: u, v, and d·w, rounded."""
+    d, (x, y, z) = focal_length(camera.fov), camera.w
+    return camera.u, camera.v, (d * x, d * y, d * z)
+
+
+@lru_cache(maxsize=8)
+def _reach(raster: Raster) -> float:
+    widest, highest = (max(map(abs, ends)) for ends in raster.ends())
+    sizes = [widest * abs(x) + highest * abs(y) + abs(z) for x, y, z in zip(*axes_of(raster.camera), strict=True)]
+    return float(in_range(np.sqrt(_square(*sizes))))
 
 
 def rows_of(grid: Grid, rows: slice) -> Grid:
@@ -211,12 +225,12 @@ def squares(grid: Grid, rows: slice = slice(None), columns: slice = slice(None))
 
 def directions(grid: Grid, rows: slice = slice(None), columns: slice = slice(None)) -> Vectors:
     """The directions of a grid's rays, or of some of them: x, y, z, each (rows, columns)."""
-    return directions_of(grid, grid.across[None, columns], grid.up[rows, None])
+    return directions_of((grid.u, grid.v, grid.back), grid.across[None, columns], grid.up[rows, None])
 
 
-def directions_of(grid: Grid, across: Number, up: Number) -> tuple[Number, Number, Number]:
-    """The directions of the rays with these U and V."""
-    x, y, z = (across * u + (up * v - back) for u, v, back in zip(grid.u, grid.v, grid.back, strict=True))
+def directions_of(axes: tuple[Vector, Vector, Vector], across: Number, up: Number) -> tuple[Number, Number, Number]:
+    """The directions of the rays with these U and V, for `axes_of` a camera."""
+    x, y, z = (across * u + (up * v - back) for u, v, back in zip(*axes, strict=True))
     return x, y, z
 
 
@@ -325,7 +339,7 @@ def spread(raster: Raster) -> float:
 
     n₃·D = 1 for all of them, so |D| ≥ 1 / |n₃|.
     """
-    inverse, reach = inverse_frame(raster.camera), eye_grid(raster).reach
+    inverse, reach = inverse_frame(raster.camera), _reach(raster)
     if inverse is None or not isfinite(reach):
         return inf
     return reach * hypot(*inverse[0][2])

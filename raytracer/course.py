@@ -179,7 +179,7 @@ class _Loop:
         raster, ask = self._plan.raster, self._functions.get("eye_ray")
         if ask is None:
             grid = eye_grid(raster)
-            return directions_of(grid, grid.across[xs], grid.up[ys])
+            return directions_of(grid.axes, grid.across[xs], grid.up[ys])
         size = raster.width, raster.height
         found = [
             three_numbers(ask, ask(raster.camera, x, y, *size), "a direction, three numbers")

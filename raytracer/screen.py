@@ -50,7 +50,7 @@ from raytracer.arrays import (
     aligned,
 )
 from raytracer.boxes import Lens, make_lens
-from raytracer.camera import Raster, eye_grid, fine_columns, fine_rows
+from raytracer.camera import Raster, eye_grid, fine_columns, fine_rows, grid_of
 from raytracer.eye import bundle_of, usable_spread
 from raytracer.facets import exact_volume
 from raytracer.full import surfaces_of, terms_of
@@ -470,14 +470,12 @@ def _view(raster: Raster, origin: np.ndarray, balls: np.ndarray, material: np.nd
 
 @lru_cache(maxsize=8)
 def _rays(raster: Raster) -> Grid:
-    """With eight columns and one row to spare."""
-    grid, (across, up) = eye_grid(raster), _spare_columns_and_rows(raster.of_any_camera)
-    a1, a0 = (np.append(rows, rows[-1]) for rows in (grid.a1, grid.a0))
-    return grid._replace(across=across, up=up, a1=a1, a0=a0)
+    return grid_of(raster, *_spare_columns_and_rows(raster.of_any_camera))
 
 
 @lru_cache(maxsize=8)
 def _spare_columns_and_rows(raster: Raster) -> tuple[np.ndarray, np.ndarray]:
+    """With eight columns and one row to spare."""
     grid = eye_grid(raster)
     return np.append(grid.across, np.full(SPARE, grid.across[-1])), np.append(grid.up, grid.up[-1])
 

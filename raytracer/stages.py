@@ -82,7 +82,7 @@ class Block:
         if self.columns is None:
             assert isinstance(self.rows, slice)
             return directions(grid, self.rows)
-        return directions_of(grid, grid.across[self.columns], grid.up[self.rows])
+        return directions_of(grid.axes, grid.across[self.columns], grid.up[self.rows])
 
     @cached_property
     def _unit(self) -> int:
