@@ -75,6 +75,7 @@ _MOST_WORKERS = 8  # that sort: each counts all tiles anew
 _BAND_PIXELS = 1 << 18  # of a numpy stage's block
 _PIXELS_A_MOMENT, _SPHERES_A_MOMENT = 1 << 22, 1 << 17  # what is drawn in a few milliseconds
 _WORTH_A_THREAD = 8  # a moment
+_MOMENTS_A_PIECE = 4
 _NUMBERS = 1 << 14  # of spheres of a tile, for the blocks that show but one
 _STACK = 8 * 24  # boxes that may wait, eight a level
 _KEPT = 1 << 26  # bytes of a workspace that is kept
@@ -150,12 +151,16 @@ class Screen(NamedTuple):
     def bands(self, shading: float = 0.0, joint: bool = False) -> list[slice]:
         """The picture's rows, cut between tiles into pieces that take a moment.
 
-        Some for each core, so that all are done at one time, but where `joint`: all are at work on the same piece.
+        Some for each core, so that all are done at one time, but where `joint`: all are at work on the same piece, and
+        wait for the interpreter when it is done, so that it takes some moments.
         """
-        height = self.kernels.TILE_HEIGHT
+        height, moments = self.kernels.TILE_HEIGHT, self._moments(shading)
         rows = -(-self.raster.height // height)
-        step = rows // max(1 if joint else 4 * cores(), int(self._moments(shading)))
-        step = max(1, step if joint else min(step, _BAND_PIXELS // (height * self.raster.width)))
+        if joint:
+            step = rows // max(1, int(moments / _MOMENTS_A_PIECE))
+        else:
+            step = min(rows // max(4 * cores(), int(moments)), _BAND_PIXELS // (height * self.raster.width))
+        step = max(1, step)
         cuts = [row * height for row in range(0, rows, step)]
         return [slice(a, b) for a, b in zip(cuts, [*cuts[1:], self.raster.height], strict=True)]
 
