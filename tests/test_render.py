@@ -117,7 +117,7 @@ def test_progress_counts_all_bands_and_cancelling_ends_the_picture():
         render_scene(ONE, "hit", 2000, 100, cancelled=lambda: True)
     asked = threading.Event()
     with pytest.raises(Cancelled):
-        render_scene(ONE, "hit", 4000, 4000, progress=lambda *_: asked.set(), cancelled=asked.is_set)
+        render_scene(ONE, "hit", 8000, 5000, progress=lambda *_: asked.set(), cancelled=asked.is_set)
 
 
 def test_a_stage_of_ones_own_takes_a_function_and_a_row(monkeypatch):
