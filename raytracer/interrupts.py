@@ -16,6 +16,10 @@ _ENDING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if 
 _came: list[int] = []  # of these
 
 
+class _Told(KeyboardInterrupt):
+    """To end. After a plain KeyboardInterrupt that leaves an `exec`, `python -m` ends by SIGINT, whatever we say."""
+
+
 def end_at_once() -> None:
     """From now on Ctrl-C ends the process without a word: there is nothing yet to clean up, or nothing more."""
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
@@ -32,7 +36,7 @@ def noted() -> Iterator[None]:
 
     def note(number: int, frame: FrameType | None) -> None:
         _came.append(number)
-        raise KeyboardInterrupt
+        raise _Told
 
     def say(unraisable: sys.UnraisableHookArgs) -> None:
         if not (_came and isinstance(unraisable.exc_value, KeyboardInterrupt)):

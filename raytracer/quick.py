@@ -45,7 +45,8 @@ colours by 2u, each light's sum by 1u. So a channel is off by 255 · (its diffus
 
 and what comes that close to the border of two bytes is shaded anew, in float64. `kernels.limits` puts
 into this how close a tile's spheres are to the lights at most; c₁ is a sphere's own, and 1/cos = √a·w / √disc a
-pixel's. With e for all that is added to c₀, (c₀ + e) / c₁ is largest for η = 0.75su.
+pixel's. With e for all that is added to c₀,
+(c₀ + e) / c₁ is at most the larger of what it is for η = 0.75su, and of 2.84 / (1.5(s + t)).
 """
 
 from __future__ import annotations
@@ -97,6 +98,12 @@ def coarseness_of(parts: float, blur: Number, s: float, focus: float, widest: fl
     t2 = s * s - 1.0
     form = 1.5 * (s + np.sqrt(t2)) * _off(parts, blur, s) + U * (2.2 * t2 + 3.85 * s * s + 2.0)
     return _SPARE * form + (2.0**-53 * widest * focus * focus) * (blur * blur)
+
+
+def flattest_of(weight: float, error: float, s: float) -> float:
+    """The largest (c₀ · weight + error) / c₁ for any 1 / w, for s."""
+    least = weight * flatness_of(1.0, 0.0, s) + error
+    return float(max(least / coarseness_of(1.0, 0.0, s, 0.0, 0.0), weight * 2.84 / (1.5 * (s + np.sqrt(s * s - 1.0)))))
 
 
 def _off(parts: float, blur: Number, s: float) -> Number:

@@ -5,11 +5,25 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from raytracer import backend
+
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.load_profile("repeatable")
 
 SCENES = Path(__file__).parent.parent / "scenes"
 COURSE, HARD = sorted(SCENES.glob("*.cli")), sorted(SCENES.glob("hard/*.cli"))
+
+
+@pytest.fixture(scope="session", autouse=True)
+def machine_code_of_tests():
+    """Kept for the kernels' sources as they are: tests have kernels of their own, which call into those."""
+    if backend.why_no_compiler():
+        yield
+        return
+    from raytracer.kernels.compiler import cache_named_after_sources
+
+    with cache_named_after_sources():
+        yield
 
 
 @pytest.fixture(params=COURSE + HARD, ids=lambda path: path.stem)

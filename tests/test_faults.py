@@ -128,6 +128,21 @@ def test_a_file_that_is_being_written_is_read_as_far_as_it_is_there(tmp_path):
 
 
 @posix
+def test_a_signal_while_a_string_is_executed_has_the_same_status(tmp_path):
+    """As when a dataclass is made."""
+    (tmp_path / "told.py").write_text(
+        "import os, signal, sys\nfrom contextlib import suppress\nfrom raytracer import interrupts\n"
+        "with suppress(KeyboardInterrupt), interrupts.noted():\n"
+        "    exec('os.kill(os.getpid(), signal.SIGTERM)\\nwhile True: pass')\n"
+        "sys.exit(interrupts.status())\n"
+    )
+    command = [sys.executable, "-m", "told"]
+    environment = {**os.environ, "PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}"}
+    done = subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, timeout=60, check=False)
+    assert (done.returncode, done.stderr) == (128 + signal.SIGTERM, b"")
+
+
+@posix
 @pytest.mark.parametrize(("number", "moments"), [(signal.SIGINT, 8), (signal.SIGTERM, 2)])
 def test_a_signal_at_any_moment_ends_it_quietly(number, moments, tmp_path):
     """From the first line of the package on; before, Python itself is starting."""

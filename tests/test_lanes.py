@@ -285,14 +285,30 @@ def test_a_table_of_eight_columns():
         s.store_halves(out, np.uint64(256), k.load(c, 0))
 
     rng = np.random.default_rng(1)
-    columns, table = rng.normal(size=(8, 8)), np.zeros((9, 8), np.float32)
+    columns, table = rng.normal(size=(8, 8)) * 1e6, np.zeros((9, 8), np.float32)
     numbers, out = rng.integers(0, 9, 32).astype(np.int32), np.empty(264, np.float32)
     place, spread = np.empty(256, np.float32), np.empty(256, np.float32)
     run(columns.reshape(-1), numbers, table.reshape(-1), place, out, spread)
-    np.testing.assert_array_equal(table[1:], columns.T.astype(np.float32))
-    np.testing.assert_array_equal(out[:256].reshape(8, 32), table[numbers].T)
-    np.testing.assert_array_equal(spread.reshape(8, 32), table[np.repeat(numbers[:2], 16)].T)
+    np.testing.assert_array_equal(table[1:, 2:], columns[2:].T.astype(np.float32))
+    bits = table.view(np.int32)
+    np.testing.assert_array_equal(bits[1:, :2], np.rint(columns[:2]).T)
+    np.testing.assert_array_equal(out[:256].view(np.int32).reshape(8, 32), bits[numbers].T)
+    np.testing.assert_array_equal(spread.view(np.int32).reshape(8, 32), bits[np.repeat(numbers[:2], 16)].T)
     np.testing.assert_array_equal(out[256:], columns[0].astype(np.float32))
+
+
+def test_how_far_whole_numbers_are_beyond_others_is_rounded_once():
+    @borrowing
+    def run(numbers, wholes, out):
+        first, second = np.uint64(0), np.uint64(16)
+        found = s.beyond(s.load_two(numbers, first, second), s.load_columns(wholes)[0])
+        k.store_pair(out, first, second, found)
+
+    rng = np.random.default_rng(3)
+    numbers, wholes = rng.integers(-(1 << 29), 1 << 29, (2, 256)).astype(np.int32)
+    out = np.empty(32, np.float32)
+    run(numbers, wholes.view(np.float32), out)
+    np.testing.assert_array_equal(out, (numbers - wholes)[:32].astype(np.float32))
 
 
 @pytest.mark.parametrize("step", [3, 4])

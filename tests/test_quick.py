@@ -1,7 +1,9 @@
 """Single precision where it is certain: the bytes are float64's, and the bounds that say so hold."""
 
 from dataclasses import replace
+from functools import cache
 from types import SimpleNamespace
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -10,7 +12,7 @@ from raytracer import backend, make_plan, plain
 from raytracer.arrays import Tile
 from raytracer.bench import spread
 from raytracer.plan import Plan
-from raytracer.quick import U, coarseness_of, error_of, flatness_of, make_quick, near_of
+from raytracer.quick import U, coarseness_of, error_of, flatness_of, flattest_of, make_quick, near_of
 from raytracer.render import draw
 from raytracer.scene import Camera, Light, Materials, Scene, Spheres
 from raytracer.screen import make_canvas, make_paints, open_screen
@@ -18,7 +20,10 @@ from raytracer.screen import make_canvas, make_paints, open_screen
 pytestmark = pytest.mark.skipif(backend.why_no_compiler() != "", reason="numba is not installed")
 KERNELS = backend.load()
 if backend.why_no_compiler() == "":
-    from raytracer.kernels.limits import nearness_of
+    from raytracer.kernels import lanes, sixteen
+    from raytracer.kernels.compiler import borrowing
+    from raytracer.kernels.limits import limits_of, nearness_of
+    from raytracer.kernels.quick import _light
 SIZE = 203, 150
 
 
@@ -160,6 +165,16 @@ def test_what_the_bounds_grow_with():
         assert near_of(0.1, error) >= 2 * (2.5 * 0.1 * (np.sqrt(error) / 4 + 8 * U) + 24 * U)
 
 
+def test_the_largest_share_that_all_pixels_have_holds_for_spheres_of_any_size():
+    for s in (1.0, 1.1, 1.5, 3.6):
+        for weight, error in ((1.0, 20 * U), (3.0, 0.0), (100.0, 20 * U)):
+            for blur in (1e-4, 1.0, 100.0, 1e6):
+                rest = weight * flatness_of(2.0**22, blur, s) + error
+                found = flattest_of(weight, error, s) * coarseness_of(2.0**22, blur, s, 900.0, 3.0)
+                assert rest * (1 - 1e-12) <= found
+    assert flattest_of(1.0, 20 * U, 1.0) < 6
+
+
 def test_places_are_whole_numbers_that_int32_holds():
     scene = spread(3, seed=1)
     for width, height, fov in ((64, 48, 60.0), (1920, 1080, 60.0), (1920, 1080, 2.0), (7680, 4320, 25.0)):
@@ -192,6 +207,96 @@ def test_no_light_is_closer_to_what_a_tile_shows_than_its_bound():
         assert np.linalg.norm(points - light, axis=1).min() >= bound
         known += bound > 0.0
     assert known > 150
+
+
+class Columns(NamedTuple):
+    """What `_light` reads of a sheet."""
+
+    columns: np.ndarray
+
+
+def some_light(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """By how much colours of 32 spheres of a tile, most of them near a rim, are off, and how much they may be.
+
+    Colours and limits are the kernels', the truth is long double's.
+    """
+    width, height, fov = int(10.0 ** rng.uniform(2, 3.8)), int(10.0 ** rng.uniform(2, 3.8)), rng.choice([2, 25, 60, 95])
+    scene = Scene(Camera(fov=float(fov)), lights=tuple(Light(tuple(away), (0.9, 0.7, 0.2)) for away in away_from(rng)))
+    raster = make_plan(scene, "diffuse", width, height).raster
+    quick = make_quick(raster, scene.lights, 0, (0.0, 1.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    if not quick.usable:
+        return np.zeros(0), np.zeros(0)
+    left, top = 128 * int(rng.integers(0, width // 128 + 1)), 32 * int(rng.integers(0, height // 32 + 1))
+    tile = Tile(0, left, top, min(left + 128, width), min(top + 32, height))
+    columns, rows = rng.integers(left, left + 128, 32), rng.integers(top, top + 32, 32)
+    rho, depth = 10.0 ** rng.uniform(-4, np.log10(0.25), 32), 10.0 ** rng.uniform(0, 1, 32)
+    size, turn, rim = rho * quick.focus, rng.uniform(0, 6.3, 32), 1 - 10.0 ** rng.uniform(-5, 0, 32)
+    at_x, at_y = (columns - left - 64) - rim * size * np.cos(turn), (rows - top - 16) - rim * size * np.sin(turn)
+    fine = np.stack([columns - left - 64, rows - top - 16]).astype(np.int32) * np.int32(quick.parts)
+    u, v = (columns - quick.middle_x) * quick.parts, (quick.middle_y - rows) * quick.parts
+    longest = np.sqrt(max(
+        (x - quick.middle_x) ** 2 + (y - quick.middle_y) ** 2 + quick.focus**2 for x in (left, left + 128)
+        for y in (top, top + 32)
+    ))  # fmt: skip
+    off = 255 * coarseness_of(quick.parts, 1 / size, longest / quick.focus, quick.focus, quick.widest)
+    places = np.rint(np.stack([at_x, at_y]) * quick.parts).astype(np.int32).view(np.float32)
+    scaled = [size * quick.parts, depth / (quick.focus * quick.parts), *[255 / (size * quick.parts)] * 3, off]
+    sheet = Columns(np.concatenate([*places, *np.float32(scaled)]))
+    extremes = (1 / size).max(), (rho * depth).max(), depth.min(), depth.max()
+    found = np.empty(3 * 32, np.float32)
+    of_slope, of_all, steepest = lighting()(
+        quick, sheet, tile, longest, extremes, *fine, np.float32([*u, *v] * 4), found
+    )
+    red, steep, off = found.reshape(3, 32)
+    sure = steep < steepest
+    true, hit = true_light(scene, quick, columns, rows, (at_x + left + 64, at_y + top + 16), size, depth)
+    return np.abs(red - true)[sure & hit], ((of_slope * steep + of_all) * off)[sure & hit]
+
+
+def away_from(rng: np.random.Generator) -> np.ndarray:
+    return rng.normal(size=(int(rng.integers(1, 4)), 3)) * rng.choice([2.0, 20.0])
+
+
+def true_light(scene: Scene, quick, columns, rows, at, size, depth) -> tuple[np.ndarray, np.ndarray]:
+    """Of white spheres with their middles in column at[0] and row at[1], the red channel; and where they are hit."""
+    u, v, focus = (np.longdouble(x) for x in (columns - quick.middle_x, quick.middle_y - rows, quick.focus))
+    du, dv, size = np.longdouble(columns) - at[0], at[1] - np.longdouble(rows), np.longdouble(size)
+    along, a = du * u + dv * v, u * u + v * v + focus * focus
+    disc = along * along + a * (size * size - du * du - dv * dv)
+    tau, total = -(along + np.sqrt(np.maximum(disc, 0))) / a, 0.0
+    normal = np.stack([du + tau * u, dv + tau * v, -tau * focus]) / size
+    point = depth / focus * (1 + tau) * np.stack([u, v, -focus + 0 * u])
+    for light in scene.lights:
+        away = np.longdouble(light.position)[:, None] - point
+        total += np.maximum((normal * away).sum(axis=0) / np.sqrt((away * away).sum(axis=0)), 0) * light.colour[0]
+    return np.float64(255 * total), disc > 0
+
+
+@cache
+def lighting():
+    """A kernel: what `_light` finds for 32 pixels, red, ρ and c₁ in three rows; it returns the tile's limits."""
+
+    @borrowing
+    def lit(quick, sheet, tile, longest, extremes, x, y, rays, found):
+        u, v, _, _, _, _, _, _ = sixteen.load_columns(rays)
+        first, second = np.uint64(0), np.uint64(16)
+        rows = sixteen.load_two(x, first, second), sixteen.load_two(y, first, second)
+        (red, _, _), steep, off = _light(quick, sheet, rows[0], rows[1], u, v)
+        lanes.store_pair(found, np.uint64(0), np.uint64(16), red)
+        lanes.store_pair(found, np.uint64(32), np.uint64(48), steep)
+        lanes.store_pair(found, np.uint64(64), np.uint64(80), off)
+        blur, radius, near, far = extremes
+        all_eight = lanes.spread(blur), lanes.spread(radius), lanes.spread(near), lanes.spread(far)
+        return limits_of(quick, tile, longest, all_eight)
+
+    return lit
+
+
+def test_colours_are_no_further_off_than_their_bounds():
+    rng = np.random.default_rng(3)
+    parts = np.concatenate([error / bound for error, bound in (some_light(rng) for _ in range(400))])
+    assert len(parts) > 5000
+    assert 0.1 < parts.max() < 1.0
 
 
 def full_tiles() -> Scene:

@@ -22,6 +22,7 @@ from raytracer import (
     plain,
     render_scene,
     save_png,
+    screen,
 )
 from raytracer.image import to_bytes
 from raytracer.interpreter import interpret
@@ -108,7 +109,7 @@ def test_threads_bands_and_reused_pictures_change_nothing(stage, monkeypatch):
     assert (out[..., 3] == 7).all()
 
 
-def test_progress_counts_all_bands_and_cancelling_ends_the_picture():
+def test_progress_counts_all_bands_and_cancelling_ends_the_picture(monkeypatch):
     seen = []
     render_scene(ONE, "hit", 2000, 100, progress=lambda done, total, rows: seen.append((done, total, rows)))
     assert [done for done, _, _ in seen] == list(range(1, seen[0][1] + 1))
@@ -116,8 +117,9 @@ def test_progress_counts_all_bands_and_cancelling_ends_the_picture():
     with pytest.raises(Cancelled):
         render_scene(ONE, "hit", 2000, 100, cancelled=lambda: True)
     asked = threading.Event()
+    monkeypatch.setattr(screen, "_PIXELS_A_MOMENT", 1 << 12)
     with pytest.raises(Cancelled):
-        render_scene(ONE, "hit", 8000, 5000, progress=lambda *_: asked.set(), cancelled=asked.is_set)
+        render_scene(ONE, "hit", 2000, 2000, progress=lambda *_: asked.set(), cancelled=asked.is_set)
 
 
 def test_a_stage_of_ones_own_takes_a_function_and_a_row(monkeypatch):

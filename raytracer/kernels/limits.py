@@ -12,7 +12,7 @@ import numpy as np
 
 from raytracer.kernels.compiler import inlined
 from raytracer.kernels.lanes import smallest_of, spread
-from raytracer.quick import LIGHT, coarseness_of, flatness_of
+from raytracer.quick import LIGHT, coarseness_of, flattest_of
 from raytracer.twofold import select
 
 _TOO_CLOSE = 64.0  # of how far a light and how large a sphere is: there errors are no longer small
@@ -42,7 +42,7 @@ def widened(extremes, listed, blur, radius, depth):
 def limits_of(quick, tile, longest, extremes):
     """How far off colours are, (A·ρ + B) · c₁ times a sphere's colour, where ρ = w / √disc; and for which ρ that is so.
 
-    `longest` is the length of the tile's longest ray, in pixels.
+    `longest` is the length of the tile's longest ray, in pixels; w and disc are in parts of a pixel.
     """
     blurs, radii, depths, farthest = extremes
     blur, radius, depth = -smallest_of(-blurs), -smallest_of(-radii), (smallest_of(depths), -smallest_of(-farthest))
@@ -52,9 +52,9 @@ def limits_of(quick, tile, longest, extremes):
         x, y, z, strength = quick.lights[i], quick.lights[i + 1], quick.lights[i + 2], quick.lights[i + 6]
         nearness = nearness_of(quick, tile, s, np.float64(x), np.float64(y), np.float64(z), radius, depth)
         weight, error = weight + strength * (radius * nearness), error + strength * (quick.far * nearness)
-    rest = (weight * flatness_of(quick.parts, 0.0, s) + error) / coarseness_of(quick.parts, 0.0, s, quick.focus, 0.0)
-    coarsest = coarseness_of(quick.parts, blur, s, quick.focus, quick.widest)
-    return np.float32(weight * longest), np.float32(rest), np.float32(_ROUGHLY / (4.0 * np.sqrt(coarsest) * longest))
+    coarsest, by_cos = coarseness_of(quick.parts, blur, s, quick.focus, quick.widest), longest * quick.parts
+    steepest = _ROUGHLY / (4.0 * np.sqrt(coarsest) * by_cos)
+    return np.float32(weight * by_cos), np.float32(flattest_of(weight, error, s)), np.float32(steepest)
 
 
 @inlined
