@@ -351,7 +351,7 @@ class Quick(NamedTuple):
     back: float  # the focal length by half of that
     steep: float  # s of `quick`, at most
     widest: float  # m for which that is so
-    lights: np.ndarray  # float32, flat, eight numbers each: place in the camera's axes, half the colour, its strength
+    lights: np.ndarray  # float32, flat, eight each: place in the camera's axes, half the colour, strength, 5u · how far
     weight: float  # the sum of those
     far: float  # what the error of a light's place adds where it is near
     rounding: float  # what roundings add

@@ -134,7 +134,7 @@ def make_quick(
         weight, farthest = weight + strength, max(farthest, hypot(*away))
         place = (inner(*axis, *away) for axis in (camera.u, camera.v, camera.w))
         halves = (0.5 * channel for channel in light.colour)  # of what twice a cosine is multiplied by
-        rows.append([*place, *halves, strength, 0.0])
+        rows.append([*place, *halves, strength, 5 * U * hypot(*away)])
     widest = 1.0 + (across + _BEYOND) ** 2 + (up + _BEYOND) ** 2
     steep = 0.5 * (1.0 + widest) ** 2 / (_LEAST * (widest - 1.0 + _LEAST))
     usable = bool(

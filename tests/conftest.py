@@ -1,29 +1,50 @@
 """The same examples at every run: a test that fails once fails again."""
 
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
 
-from raytracer import backend
+from raytracer import backend, interpreter, machine_code
+from raytracer.render import warm_up
+
+try:
+    import fcntl
+except ImportError:  # not on Windows
+    fcntl = None
 
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.load_profile("repeatable")
 
 SCENES = Path(__file__).parent.parent / "scenes"
+MANY = 100  # tests, of which some will want any kernel
 COURSE, HARD = sorted(SCENES.glob("*.cli")), sorted(SCENES.glob("hard/*.cli"))
 
 
 @pytest.fixture(scope="session", autouse=True)
-def machine_code_of_tests():
+def machine_code_of_tests(request):
     """Kept for the kernels' sources as they are: tests have kernels of their own, which call into those."""
     if backend.why_no_compiler():
         yield
         return
     from raytracer.kernels.compiler import cache_named_after_sources
 
+    if fcntl is not None and machine_code.folder() and len(request.session.items) > MANY:
+        compile_together(machine_code.folder())
     with cache_named_after_sources():
         yield
+
+
+def compile_together(folder):
+    """Make the kernels' machine code, each in one of the processes that run tests; else each would make all of it."""
+    scene, left = interpreter(COURSE[0]), ["hit", "diffuse", "full", "depth", "normal"]
+    for wait in (fcntl.LOCK_NB, 0):
+        for stage in list(left):
+            with (folder / f"{stage}.lock").open("w") as lock, suppress(BlockingIOError):
+                fcntl.flock(lock, fcntl.LOCK_EX | wait)
+                warm_up(scene, stage)
+                left.remove(stage)
 
 
 @pytest.fixture(params=COURSE + HARD, ids=lambda path: path.stem)

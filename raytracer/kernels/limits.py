@@ -49,9 +49,10 @@ def limits_of(quick, tile, longest, extremes):
     s = longest / quick.focus
     weight, error = quick.weight, quick.rounding
     for i in range(0, len(quick.lights), LIGHT):
-        x, y, z, strength = quick.lights[i], quick.lights[i + 1], quick.lights[i + 2], quick.lights[i + 6]
-        nearness = nearness_of(quick, tile, s, np.float64(x), np.float64(y), np.float64(z), radius, depth)
-        weight, error = weight + strength * (radius * nearness), error + strength * (quick.far * nearness)
+        x, y, z = np.float64(quick.lights[i]), np.float64(quick.lights[i + 1]), np.float64(quick.lights[i + 2])
+        nearness, strength = nearness_of(quick, tile, s, x, y, z, radius, depth), np.float64(quick.lights[i + 6])
+        weight += strength * (radius * nearness)
+        error += strength * (quick.lights[i + 7] * nearness)
     coarsest, by_cos = coarseness_of(quick.parts, blur, s, quick.focus, quick.widest), longest * quick.parts
     steepest = _ROUGHLY / (4.0 * np.sqrt(coarsest) * by_cos)
     return np.float32(weight * by_cos), np.float32(flattest_of(weight, error, s)), np.float32(steepest)
