@@ -13,6 +13,7 @@ without the interpreter: until a bell rings, as soon as the caller has let go of
 
 from __future__ import annotations
 
+import atexit
 import ctypes
 import os
 from collections.abc import Callable
@@ -20,7 +21,7 @@ from contextlib import suppress
 from functools import cache, partial
 from itertools import count
 from queue import SimpleQueue
-from threading import Thread, get_native_id
+from threading import Lock, Thread, get_native_id
 from types import ModuleType
 from typing import TypeVar
 
@@ -77,7 +78,7 @@ class _Task:
                 interrupted = interrupt
 
 
-def _help(tasks: SimpleQueue[_Task]) -> None:
+def _help(tasks: SimpleQueue[_Task], lingering: Lock) -> None:
     while True:
         task = tasks.get()
         ended = task.ended
@@ -85,8 +86,9 @@ def _help(tasks: SimpleQueue[_Task]) -> None:
         if mine:
             task.do()
         del task  # and all that it holds, while there is nothing to do
-        if mine and _kernels is not None:
-            _kernels.linger(ended, BELL, _TURNS)
+        with lingering:
+            if mine and _kernels is not None:
+                _kernels.linger(ended, BELL, _TURNS)
 
 
 class _Helpers:
@@ -94,14 +96,21 @@ class _Helpers:
 
     def __init__(self) -> None:
         self.tasks = SimpleQueue[_Task]()
+        self._lingering = [Lock() for _ in range(max(1, cores() - 1))]  # held by those who do
         threads = [
-            Thread(target=_help, args=(self.tasks,), name=f"raytracer_{number}", daemon=True)
-            for number in range(max(1, cores() - 1))
+            Thread(target=_help, args=(self.tasks, lock), name=f"raytracer_{number}", daemon=True)
+            for number, lock in enumerate(self._lingering)
         ]
         for thread in threads:
             thread.start()
         self._ids = [thread.native_id for thread in threads if thread.native_id is not None]
         self._allowed: set[int] | None = None  # the cores that they are kept to
+
+    def rest(self) -> None:
+        """Let nobody linger any more: a thread that comes back while Python ends finds no interpreter."""
+        BELL[0] += 1
+        for lock in self._lingering:
+            lock.acquire(timeout=1)
 
     def start(self, tasks: list[_Task], rings: bool) -> None:
         self.make_way()
@@ -139,6 +148,16 @@ def _this_core() -> int | None:
 
 
 _helpers = cache(_Helpers)
+
+
+@atexit.register
+def _rest() -> None:
+    global _kernels
+    _kernels = None
+    if _helpers.cache_info().currsize:
+        _helpers().rest()
+
+
 if hasattr(os, "register_at_fork"):  # not on Windows
     os.register_at_fork(after_in_child=_helpers.cache_clear)  # threads do not survive a fork
 

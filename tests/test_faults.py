@@ -154,7 +154,7 @@ def test_a_signal_at_any_moment_ends_it_quietly(number, moments, tmp_path):
         _, said = process.communicate(timeout=300)  # what comes while machine code is made may be answered after that
         if "runpy" not in said:
             assert "Traceback" not in said
-            assert process.returncode in (0, 128 + number, -number)  # −number: Python was not yet there
+            assert process.returncode in (0, 128 + number, -number), said  # −number: Python was not yet there
         assert not list(tmp_path.glob(".*"))
 
 

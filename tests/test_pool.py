@@ -1,7 +1,10 @@
 """Work that is shared among threads."""
 
 import os
+import subprocess
+import sys
 import threading
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +13,7 @@ from raytracer import backend, plain
 from raytracer.pool import share
 
 KERNELS = backend.load()
+ROOT = Path(__file__).parent.parent
 
 
 @pytest.mark.parametrize("threads", [1, 2, 5, None])
@@ -98,6 +102,19 @@ def test_helpers_that_linger_help_again(rings):
     for _ in range(20):
         share([0, 1], work, 2, rings=rings)
     assert sorted(helped) == [0] * 20 + [1] * 20
+
+
+@pytest.mark.skipif(KERNELS is plain, reason="numba is not installed")
+def test_nobody_lingers_while_python_ends():
+    """In a process of its own, whose helpers would linger for ever."""
+    program = (
+        "import threading, time\nfrom raytracer import backend, pool\n"
+        "backend.load()\npool._TURNS, both = 1 << 40, threading.Barrier(2, timeout=30)\n"
+        "pool.share([0, 1], lambda job, worker: both.wait(), 2)\n"
+        "start = time.perf_counter()\npool._rest()\nprint(time.perf_counter() - start < 0.5)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, timeout=60, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, b"True\n", b"")
 
 
 def test_no_jobs_are_no_trouble():
