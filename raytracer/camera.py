@@ -30,10 +30,11 @@ SAMPLINGS = {"corner": 0, "centre": 1}  # what is added to 2x and 2y
 
 _LARGEST_SIDE = (1 << 31) - 1  # that a PNG can name
 _CROOKED = 2.0**-44  # a frame whose vectors are no more than this off unit length and right angles is taken for right
-_CAMERA = Camera()
 _SKEWED = 1e3  # a frame whose inverse magnifies rounding by more than this
 _BAND_TESTS = 1 << 22
 BAND_PIXELS = 1 << 15  # enough to outweigh what a task costs, few enough to stay in a core's cache
+
+_CAMERA = Camera()  # any
 
 Vectors = tuple[np.ndarray, np.ndarray, np.ndarray]
 
@@ -173,7 +174,7 @@ def _whole_frame(camera: Camera) -> tuple[list[int], int]:
 
 
 @lru_cache(maxsize=8)
-def _columns_and_rows(raster: Raster) -> tuple[np.ndarray, np.ndarray]:
+def columns_and_rows(raster: Raster) -> tuple[np.ndarray, np.ndarray]:
     """U of each column, V of each row."""
     across, _ = raster.numerators(np.arange(raster.width), 0)
     _, up = raster.numerators(0, np.arange(raster.height))
@@ -187,7 +188,7 @@ def eye_grid(raster: Raster) -> Grid:
     U is rounded once, each product once, each of the two sums once: a component of D is within
     4u·(|U u| + |V v| + |d w|) of the truth, and `reach` is the length of the longest vector of such sums.
     """
-    return grid_of(raster, *_columns_and_rows(raster.of_any_camera))
+    return grid_of(raster, *columns_and_rows(raster.of_any_camera))
 
 
 def grid_of(raster: Raster, across: np.ndarray, up: np.ndarray) -> Grid:
@@ -225,7 +226,7 @@ def squares(grid: Grid, rows: slice = slice(None), columns: slice = slice(None))
 
 def directions(grid: Grid, rows: slice = slice(None), columns: slice = slice(None)) -> Vectors:
     """The directions of a grid's rays, or of some of them: x, y, z, each (rows, columns)."""
-    return directions_of((grid.u, grid.v, grid.back), grid.across[None, columns], grid.up[rows, None])
+    return directions_of(grid.axes, grid.across[None, columns], grid.up[rows, None])
 
 
 def directions_of(axes: tuple[Vector, Vector, Vector], across: Number, up: Number) -> tuple[Number, Number, Number]:

@@ -58,13 +58,17 @@ class _Task:
         """Whether it is the caller's now, to do it or to call it off: the first one's, whatever threads there are."""
         return next(self._claims) == 0
 
-    def do(self) -> None:
+    def do(self) -> np.ndarray | None:
+        """Do it, unless somebody else has claimed it; returns where to say that it has ended."""
+        if not self.claim():
+            return None
         error = None
         try:
             self._work()
         except BaseException as raised:
             error = raised
         self._end.put(error)
+        return self.ended
 
     def wait(self) -> BaseException | None:
         """Until it has ended, also if that is interrupted; returns what was raised."""
@@ -80,14 +84,9 @@ class _Task:
 
 def _help(tasks: SimpleQueue[_Task], lingering: Lock) -> None:
     while True:
-        task = tasks.get()
-        ended = task.ended
-        mine = task.claim()
-        if mine:
-            task.do()
-        del task  # and all that it holds, while there is nothing to do
+        ended = tasks.get().do()  # and keep nothing of it while there is nothing to do
         with lingering:
-            if mine and _kernels is not None:
+            if ended is not None and _kernels is not None:
                 _kernels.linger(ended, BELL, _TURNS)
 
 

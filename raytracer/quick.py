@@ -29,9 +29,9 @@ middle's is at most ρ): nearer to each other than the sum of both, two spheres 
 
 **What colour it has.** In pixels, with D = (u, v, −f), the hit is at n = δ + τD from the sphere's middle, where
 δ = (x, y, 0), τ = −(g + √(g² + a(w² − δ²))) / a, g = δ·D, a = D·D. Let s² be the largest a/f² of a pixel of the tile,
-and t² = s² − 1; then |δ| ≤ 1.05sw. u and v are exact; X and Y are rounded to whole parts of a pixel, of which it
-has 2ᵏ, and x and y, whole numbers of those, are rounded once; so δ is off by √2ηw, η = 2⁻ᵏ/2w + 0.75su; f and w are
-rounded once. So g is off by √a·w(1.42η + 2.1tu), the root's argument by aw²·2c₁, and n by w·q, where cos is the root by
+and t² = s² − 1; then |δ| ≤ 1.05sw. u and v are exact; X and Y are rounded to whole parts of a pixel, of which it has
+2ᵏ, and x and y, whole numbers of those, are rounded once; so δ is off by √2ηw, η = 2⁻ᵏ/2w + 0.75su; f and w are rounded
+once. So g is off by √a·w(1.42η + 2.1tu), the root's argument by aw²·2c₁, and n by w·q, where cos is the root by
 its largest value and
 
     q = c₀ + c₁/cos,  c₁ = 1.5(s + t)η + (2.2t² + 3.85s² + 2)u,  c₀ = 2.84η + (7.4t + 6.5)u
@@ -43,10 +43,9 @@ colours by 2u, each light's sum by 1u. So a channel is off by 255 · (its diffus
 
     Σ light · (q (1 + r/|T|) + 5u|light|/|T| + (16 + lights)u)
 
-and what comes that close to the border of two bytes is shaded anew, in float64. `kernels.limits` puts
-into this how close a tile's spheres are to the lights at most; c₁ is a sphere's own, and 1/cos = √a·w / √disc a
-pixel's. With e for all that is added to c₀,
-(c₀ + e) / c₁ is at most the larger of what it is for η = 0.75su, and of 2.84 / (1.5(s + t)).
+and what comes that close to the border of two bytes is shaded anew, in float64. `kernels.limits` puts into this how
+close a tile's spheres are to the lights at most; c₁ is a sphere's own, and 1/cos = √a·w / √disc a pixel's. With e for
+all that is added to c₀, (c₀ + e) / c₁ is at most the larger of what it is for η = 0.75su, and of 2.84 / (1.5(s + t)).
 """
 
 from __future__ import annotations
@@ -131,10 +130,11 @@ def make_quick(
     for light in lights:
         away = light_from_eye(light, camera, unit)
         strength, darkest = max(map(abs, light.colour)), min(darkest, *light.colour)
-        weight, farthest = weight + strength, max(farthest, hypot(*away))
+        distance = hypot(*away)
+        weight, farthest = weight + strength, max(farthest, distance)
         place = (inner(*axis, *away) for axis in (camera.u, camera.v, camera.w))
         halves = (0.5 * channel for channel in light.colour)  # of what twice a cosine is multiplied by
-        rows.append([*place, *halves, strength, 5 * U * hypot(*away)])
+        rows.append([*place, *halves, strength, 5 * U * distance])
     widest = 1.0 + (across + _BEYOND) ** 2 + (up + _BEYOND) ** 2
     steep = 0.5 * (1.0 + widest) ** 2 / (_LEAST * (widest - 1.0 + _LEAST))
     usable = bool(

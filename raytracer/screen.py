@@ -50,7 +50,7 @@ from raytracer.arrays import (
     aligned,
 )
 from raytracer.boxes import Lens, make_lens
-from raytracer.camera import Raster, eye_grid, fine_columns, fine_rows, grid_of
+from raytracer.camera import Raster, columns_and_rows, fine_columns, fine_rows, grid_of
 from raytracer.eye import bundle_of, usable_spread
 from raytracer.facets import exact_volume
 from raytracer.full import surfaces_of, terms_of
@@ -475,14 +475,15 @@ def _view(raster: Raster, origin: np.ndarray, balls: np.ndarray, material: np.nd
 
 @lru_cache(maxsize=8)
 def _rays(raster: Raster) -> Grid:
+    """`eye_grid` with columns and rows to spare."""
     return grid_of(raster, *_spare_columns_and_rows(raster.of_any_camera))
 
 
 @lru_cache(maxsize=8)
 def _spare_columns_and_rows(raster: Raster) -> tuple[np.ndarray, np.ndarray]:
     """With eight columns and one row to spare."""
-    grid = eye_grid(raster)
-    return np.append(grid.across, np.full(SPARE, grid.across[-1])), np.append(grid.up, grid.up[-1])
+    across, up = columns_and_rows(raster)
+    return np.append(across, np.full(SPARE, across[-1])), np.append(up, up[-1])
 
 
 def _with_facets(
@@ -534,20 +535,9 @@ def _sort(
 
         def find(room: Records) -> tuple[int, int]:
             found: tuple[int, int] = kernels.bound(
-                glance,
-                lens,
-                view.eye,
-                view.reach,
-                view.kappa,
-                view.balls,
-                first,
-                last,
-                columns,
-                room,
-                slow,
-                boxes,
+                glance, lens, view.eye, view.reach, view.kappa, view.balls, first, last, columns, room, slow, boxes,
                 bell,
-            )
+            )  # fmt: skip
             return found
 
         count(part, find, (last - first) * 9 // 8 + _SPARE_RECORDS, slow)

@@ -30,8 +30,9 @@ def machine_code_of_tests(request):
         return
     from raytracer.kernels.compiler import cache_named_after_sources
 
-    if fcntl is not None and machine_code.folder() and len(request.session.items) > MANY:
-        compile_together(machine_code.folder())
+    folder = machine_code.folder()
+    if fcntl is not None and folder and len(request.session.items) > MANY:
+        compile_together(folder)
     with cache_named_after_sources():
         yield
 

@@ -26,7 +26,6 @@ from raytracer.kernels.sixteen import (
 )
 from raytracer.kernels.strips import apart, bytes_of, fetch_row, list_pair, pixel_of
 from raytracer.quick import ONE_BYTE, U
-from raytracer.twofold import select
 
 _X_REST, _X_WHOLE, _Y_REST, _Y_WHOLE, _X_SLOPE, _Y_SLOPE, _START, _SIZE2 = range(8)
 _B, _TWICE_ROOT_B, _ROOT_B, _RIM_ERROR, _SURE, _RIM, _OF_A_SPHERE = range(8, 15)
@@ -78,12 +77,9 @@ def tabulate(view, bins, first, end, tile, s, paints, numbers):
         red, green, blue, _ = gather_rows(paints.colours, gather(view.material, where))
         colour, light = (255.0 * red, 255.0 * green, 255.0 * blue), batch + np.uint64(_OF_A_SPHERE)
         weight, error, near = _tabulate_lights(quick, paints.lights, numbers, light, x, y, z, radius, blur, colour)
-        nearest = _larger(nearest, near)
-        brightest, p, f = (
-            _larger(_larger(*colour[:2]), colour[2]),
-            (abs(across) + abs(down)) * over_root,
-            quick.focus * blur,
-        )
+        nearest = greater(nearest, near)
+        brightest = greater(greater(colour[0], colour[1]), colour[2])
+        p, f = (abs(across) + abs(down)) * over_root, quick.focus * blur
         rim = rim_error(sigma, p, rho, blur) + (2.0**-53 * quick.widest) * f * f
         spare = (5.0 + 2.0 * len(paints.lights)) / ONE_BYTE
         least = brightest * (weight * least_error(sigma, tilt, p, rho, blur) + error)
@@ -106,7 +102,7 @@ def _tabulate_lights(quick, lights, numbers, light, x, y, z, radius, blur, colou
         tx, ty, tz = lights[i, 0] - x, lights[i, 1] - y, lights[i, 2] - z
         nearness = 1.0 / np.sqrt(inner(tx, ty, tz, tx, ty, tz))
         epsilon, by_size = radius * nearness, nearness * blur
-        nearest = _larger(nearest, epsilon)
+        nearest = greater(nearest, epsilon)
         _put(numbers, light, _ACROSS, inner(quick.u[0], quick.u[1], quick.u[2], tx, ty, tz) * by_size)
         _put(numbers, light, _DOWN, -inner(quick.v[0], quick.v[1], quick.v[2], tx, ty, tz) * by_size)
         _put(numbers, light, _ALONG, inner(x, y, z, tx, ty, tz) * nearness / radius)
@@ -119,11 +115,6 @@ def _tabulate_lights(quick, lights, numbers, light, x, y, z, radius, blur, colou
         error = error + strength * (slope * (4.3 * U) + cubic_error(epsilon) + nearness * (quick.far * 2.0**-20))
         light += np.uint64(_OF_A_LIGHT)
     return weight, error, nearest
-
-
-@inlined
-def _larger(a, b):
-    return select(a > b, a, b)
 
 
 def _shade(tile, count, quick, sheet, out):

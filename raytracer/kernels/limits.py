@@ -17,7 +17,12 @@ from raytracer.twofold import select
 
 _TOO_CLOSE = 64.0  # of how far a light and how large a sphere is: there errors are no longer small
 _ROUGHLY = 1.0 - 2.0**-12  # for rough roots
-_NO_RAY_SO_WIDE = 1.0  # the sine of the angle between a tile's middle and its corners
+
+
+@inlined
+def largest(lanes):
+    """The largest of eight lanes."""
+    return -smallest_of(-lanes)
 
 
 @inlined
@@ -29,10 +34,10 @@ def no_extremes():
 @inlined
 def widened(extremes, listed, blur, radius, depth):
     """The extremes, in each of eight lanes, after another eight spheres, or those of them that are listed."""
-    largest_blur, largest, nearest, farthest = extremes
+    blurriest, widest, nearest, farthest = extremes
     return (
-        select(listed & (blur > largest_blur), blur, largest_blur),
-        select(listed & (radius > largest), radius, largest),
+        select(listed & (blur > blurriest), blur, blurriest),
+        select(listed & (radius > widest), radius, widest),
         select(listed & (depth < nearest), depth, nearest),
         select(listed & (depth > farthest), depth, farthest),
     )
@@ -45,7 +50,7 @@ def limits_of(quick, tile, longest, extremes):
     `longest` is the length of the tile's longest ray, in pixels; w and disc are in parts of a pixel.
     """
     blurs, radii, depths, farthest = extremes
-    blur, radius, depth = -smallest_of(-blurs), -smallest_of(-radii), (smallest_of(depths), -smallest_of(-farthest))
+    blur, radius, depth = largest(blurs), largest(radii), (smallest_of(depths), largest(farthest))
     s = longest / quick.focus
     weight, error = quick.weight, quick.rounding
     for i in range(0, len(quick.lights), LIGHT):
@@ -66,7 +71,7 @@ def nearness_of(quick, tile, s, x, y, z, radius, depth):
     half2 = (0.5 * (tile.right - tile.left) + 1.0) ** 2 + (0.5 * (tile.bottom - tile.top) + 1.0) ** 2
     sine2, along, away = half2 / length2, (x * u + y * v - z * quick.focus) / np.sqrt(length2), np.sqrt(away2)
     distance = max(depth[0] - radius - away, away - (depth[1] + radius) * s)
-    if sine2 < _NO_RAY_SO_WIDE:
+    if sine2 < 1.0:  # of the angle between the tile's middle and its corners
         across = away if along < 0.0 else np.sqrt(max(away2 - along * along, 0.0))
         distance = max(distance, across * np.sqrt(1.0 - sine2) - max(along, 0.0) * np.sqrt(sine2))
     return 1.0 / distance if distance * _TOO_CLOSE > away + radius else np.inf

@@ -31,13 +31,12 @@ from raytracer.kernels.lanes import (
     load,
     load_low,
     mask_of,
-    smallest_of,
     spread,
     store,
     store_pair,
     whole,
 )
-from raytracer.kernels.limits import limits_of, no_extremes, widened
+from raytracer.kernels.limits import largest, limits_of, no_extremes, widened
 from raytracer.kernels.rough import inverse, twice_root
 from raytracer.kernels.sixteen import (
     SIDE,
@@ -120,7 +119,7 @@ def _draw_all(view, bins, first, end, tile, paints, sheet):
         if bits_of(unfit) & ((1 << count) - 1):
             return False, extremes
         listed = mask_of((1 << count) - 1)
-        tie = max(tie, _largest(select(listed, near, 0.0)))
+        tie = max(tie, largest(select(listed, near, 0.0)))
         over_tie = np.float32(1.0 / tie)
         extremes = widened(extremes, listed, blur, radius, depth)
         for j in range(np.uint64(0), np.uint64(count)):
@@ -128,16 +127,6 @@ def _draw_all(view, bins, first, end, tile, paints, sheet):
             fetch(view, sphere_of(bins.entries[place + np.uint64(AHEAD)]))
             draw(bins.entries[place], np.int32(row + j + _ONE), j, over_tie, sheet)
     return True, extremes
-
-
-@inlined
-def _largest(lanes):
-    return -smallest_of(-lanes)
-
-
-@inlined
-def _larger(a, b):
-    return select(a > b, a, b)
 
 
 def _look(view, bins, at, row, tile, s, paints, sheet):
@@ -180,7 +169,7 @@ def _look(view, bins, at, row, tile, s, paints, sheet):
         parts = np.float64(quick.parts)
         size, scale = rho * (quick.focus * parts), (255.0 / parts) * blur
         red, green, blue, _ = gather_rows(paints.colours, gather(view.material, where))
-        brightest = 255.0 * _larger(_larger(red, green), blue)
+        brightest = 255.0 * greater(greater(red, green), blue)
         off = coarseness_of(quick.parts, blur, s, quick.focus, quick.widest) * brightest
         store_table(
             sheet.table, row + _ONE, middle_x * parts, middle_y * parts, size, depth * (pixel / parts), red * scale,

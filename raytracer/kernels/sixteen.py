@@ -330,10 +330,9 @@ def store_table(typing, table, row, a, b, c, d, e, f, g, h):
 
     def lower(context, builder, sig, args):
         table, row, *columns = args
-        halves = [_wholes(builder, column) for column in columns[:2]] + [
-            _halves(builder, column) for column in columns[2:]
-        ]
-        for i, values in enumerate(_turned(builder, halves)):
+        kinds = [_wholes] * 2 + [_halves] * (_COLUMNS - 2)
+        stored = [of_kind(builder, column) for of_kind, column in zip(kinds, columns, strict=True)]
+        for i, values in enumerate(_turned(builder, stored)):
             place = builder.add(builder.mul(row, ir.Constant(row.type, _COLUMNS)), ir.Constant(row.type, _COLUMNS * i))
             builder.store(values, _address(context, builder, sig.args[0], table, place, values.type), align=4)
         return context.get_dummy_value()

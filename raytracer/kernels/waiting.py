@@ -13,7 +13,7 @@ from numba.core import types
 from numba.core.cgutils import get_or_insert_function
 from numba.extending import intrinsic
 
-from raytracer.kernels.compiler import borrowing
+from raytracer.kernels.compiler import borrowing, inlined
 from raytracer.kernels.lanes import PROCESSOR, take_number
 
 _ALIGNED = 8
@@ -55,25 +55,28 @@ def _pause(typing):
     return types.void(), lower
 
 
+@inlined
+def _changes(array, before, turns):
+    """Whether another thread writes a number other than that before so many turns are over."""
+    for _ in range(turns):
+        if _seen(array) != before:
+            return True
+        _pause()
+    return False
+
+
 @borrowing("void(int64[::1], int64[::1], int64)")
 def linger(ended, bell, turns):
     """Say that something has ended, and wait until the bell rings, so many turns at most."""
     before = _seen(bell)
     _show(ended, 1)
-    for _ in range(turns):
-        if _seen(bell) != before:
-            break
-        _pause()
+    _changes(bell, before, turns)
 
 
 @borrowing("boolean(int64[::1], int64)")
 def has_ended(ended, turns):
     """Whether something has ended before so many turns are over."""
-    for _ in range(turns):
-        if _seen(ended):
-            return True
-        _pause()
-    return False
+    return _changes(ended, 0, turns)
 
 
 @borrowing
