@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from window_driver import Sketch
+from window_driver import Sketch, is_written
 
 from raytracer import interpreter, load_png, render_scene
 from raytracer.compare import DIFFERENCES_LEGEND, difference_picture
@@ -87,7 +87,7 @@ def test_a_plugged_file_draws_is_mended_and_compared(start, scene, tmp_path):
     sketch.wait_for_picture(legend, "the difference")
     sketch.press("s")
     saved = tmp_path / "scene-diffuse-mine-difference.png"
-    sketch.wait_until(saved.exists, "the difference to be saved")
+    sketch.wait_until(lambda: is_written(saved), "the difference to be saved")
     sketch.press("v")
     for border in (100, 200):
         sketch.xdotool("mousemove", str(sketch.left + border), str(sketch.top + 50))

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from window_driver import PROJECT, Sketch
+from window_driver import PROJECT, Sketch, is_written
 
 from raytracer import METHODS, STAGES, interpreter, load_png, probe_pixel, render_scene, save_png
 from raytracer.camera import make_raster
@@ -224,7 +224,7 @@ def test_a_key_without_a_scene_changes_only_the_status(sketch, expected):
 def test_s_saves_what_is_seen_and_overwrites_nothing(sketch, expected):
     sketch.press("1", "n", "question", "s", "s", "2", "s")
     files = [f"{NAMES[0]}-normal.png", f"{NAMES[0]}-normal-2.png", f"{NAMES[1]}-normal.png"]
-    sketch.wait_until(lambda: all(_is_written(sketch.cwd / file) for file in files), "three files")
+    sketch.wait_until(lambda: all(is_written(sketch.cwd / file) for file in files), "three files")
     for file, name in zip(files, [NAMES[0], NAMES[0], NAMES[1]], strict=True):
         assert np.array_equal(load_png(sketch.cwd / file), expected(name, "normal"))
 
@@ -316,10 +316,6 @@ def test_a_mistake_of_ours_while_drawing_ends_the_sketch_with_status_1(display, 
     sketch = Sketch(display, tmp_path, folder, program=("-c", sabotage))
     assert sketch.end() == 1
     assert "ZeroDivisionError: sabotage" in sketch.stderr.read_text()
-
-
-def _is_written(path: Path) -> bool:
-    return path.exists() and path.stat().st_size > 0
 
 
 def test_the_readmes_picture_of_the_window(start, request):

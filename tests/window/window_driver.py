@@ -110,6 +110,11 @@ class Sketch:
         self.process.send_signal(signal.SIGINT)
 
 
+def is_written(path: Path) -> bool:
+    """Whether a saved file is there: its name is taken by an empty one while it is written."""
+    return path.exists() and path.stat().st_size > 0
+
+
 class _ClientMessage(ctypes.Structure):
     _fields_ = (
         ("type", ctypes.c_int),
