@@ -206,6 +206,7 @@ class Tree(NamedTuple):
 
 
 APART = 16  # int64 from what one thread counts to what another does
+BOARD = 4 * APART + 1024  # int64 of what threads tell each other: see `kernels.waiting`
 FACET = 24  # numbers a triangle, of which some are to spare
 CELL_BITS = 7  # a cell of `Cells` is at most 2**7 pixels wide and high
 CORNERS = 12  # numbers a triangle at the stage `full`: its corners, how far away they are, and some to spare
@@ -264,6 +265,19 @@ class Records(NamedTuple):
     shapes: np.ndarray  # int32
 
 
+class Piles(NamedTuple):
+    """What is written on while shapes are sorted into tiles, in parts: some of spheres, and the triangles if any."""
+
+    cuts: np.ndarray  # int64 (parts of spheres + 1,), the first sphere of each, multiples of 8; how many there are
+    rooms: np.ndarray  # int64 (parts + 1,), where the records of each part begin
+    records: Records
+    slow: np.ndarray  # int32 (spheres,), which are slow: from `cuts` on, of each part
+    boxes: np.ndarray  # int32 (parts, 64)
+    found: np.ndarray  # int64 (parts, 2): how many records there are, or would be, and how many slow spheres
+    counts: np.ndarray  # int64 (parts, tiles)
+    progress: np.ndarray  # int64, of the threads: see `kernels.sorting`
+
+
 class Bins(NamedTuple):
     """Which of the other spheres reach into which tile.
 
@@ -297,8 +311,13 @@ class Tiles(NamedTuple):
     taken: np.ndarray  # int64 (runs · APART,): of each run, how many have been taken, from its front, and from its end
     first: int
     last: int  # excluded
-    own: int  # the run of the thread that asks
-    bell: np.ndarray  # int64 (1,), for those who linger: see `pool`
+
+
+class Desks(NamedTuple):
+    """What threads work with, a row each."""
+
+    memory: np.ndarray  # uint8 (threads, DESK), for a `Scratch` each: see `kernels.desks`
+    doubts: np.ndarray  # int64 (threads, n): how many doubtful pixels follow; each as row · width + column
 
 
 class Scratch(NamedTuple):

@@ -7,8 +7,8 @@ Linux often wakes a thread on the core of whoever wakes it, where both then take
 beside a core that is idle. So they are kept off that core.
 
 To wake a thread takes a tenth of a millisecond, and as much again if it wants the interpreter while another has it. So
-once they have done something, threads linger until the next `share`, for a moment, if there are the kernels to do it
-without the interpreter: until a bell rings, as soon as the caller has let go of that.
+once they have done something, threads linger for a moment, if there are the kernels to do it without the interpreter:
+until a bell rings, as there is a task, or until a kernel that is called `together` asks for help, which takes nothing.
 """
 
 from __future__ import annotations
@@ -16,23 +16,28 @@ from __future__ import annotations
 import atexit
 import ctypes
 import os
-from collections.abc import Callable
-from contextlib import suppress
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from functools import cache, partial
 from itertools import count
 from queue import SimpleQueue
 from threading import Lock, Thread, get_native_id
 from types import ModuleType
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
-BELL = np.zeros(1, np.int64)
+from raytracer.arrays import APART, BOARD, aligned
+
+_BELL, _ASKED, _SEATS = 0, 1, APART  # where those are on the board, see `kernels.waiting`
 _TURNS = 60_000  # a millisecond, about: more than it takes to begin with the next picture
+_NAP = 2e-4  # seconds
 _kernels: ModuleType | None = None
 
 Job = TypeVar("Job")
 Done = TypeVar("Done")
+Call = Callable[..., Any]
 
 
 @cache
@@ -72,51 +77,96 @@ class _Task:
 
     def wait(self) -> BaseException | None:
         """Until it has ended, also if that is interrupted; returns what was raised."""
-        interrupted: BaseException | None = None
-        while True:
-            try:
-                if _kernels is not None:
-                    _kernels.has_ended(self.ended, _TURNS)
-                return interrupted or self._end.get()
-            except KeyboardInterrupt as interrupt:
-                interrupted = interrupt
+        error, interrupt = _insist(self._wait)
+        return interrupt or error
+
+    def _wait(self) -> BaseException | None:
+        if _kernels is not None:
+            _kernels.has_ended(self.ended, _TURNS)
+        return self._end.get()
 
 
-def _help(tasks: SimpleQueue[_Task], lingering: Lock) -> None:
+def _insist(do: Callable[[], Done]) -> tuple[Done, KeyboardInterrupt | None]:
+    """Do something, again if it is interrupted; returns what comes of it, and the interrupt."""
+    interrupted: KeyboardInterrupt | None = None
     while True:
-        ended = tasks.get().do()  # and keep nothing of it while there is nothing to do
-        with lingering:
-            if ended is not None and _kernels is not None:
-                _kernels.linger(ended, BELL, _TURNS)
+        try:
+            return do(), interrupted
+        except KeyboardInterrupt as interrupt:
+            interrupted = interrupt
 
 
 class _Helpers:
     """The threads, and the queue at which they wait. They end with the process."""
 
     def __init__(self) -> None:
-        self.tasks = SimpleQueue[_Task]()
+        self.tasks = SimpleQueue[_Task | None]()  # None only wakes somebody, to help on the board
+        self.board = aligned(BOARD, np.int64)
+        self.board[:] = 0
+        self.free = Lock()  # the board
+        self._asleep = set[int]()
         self._lingering = [Lock() for _ in range(max(1, cores() - 1))]  # held by those who do
         threads = [
-            Thread(target=_help, args=(self.tasks, lock), name=f"raytracer_{number}", daemon=True)
-            for number, lock in enumerate(self._lingering)
+            Thread(target=self._help, args=(number,), name=f"raytracer_{number}", daemon=True)
+            for number in range(len(self._lingering))
         ]
         for thread in threads:
             thread.start()
         self._ids = [thread.native_id for thread in threads if thread.native_id is not None]
         self._allowed: set[int] | None = None  # the cores that they are kept to
 
+    def _help(self, number: int) -> None:
+        while True:
+            ended = self._work(number)  # and keep nothing of it while there is nothing to do
+            with self._lingering[number]:
+                if ended is not None and _kernels is not None:
+                    _kernels.linger(ended, self.board, _TURNS)
+
+    def _work(self, number: int) -> np.ndarray | None:
+        """Wait for something to do; returns as `_Task.do`."""
+        self._asleep.add(number)
+        task = None if self._is_wanted() else self.tasks.get()
+        self._asleep.discard(number)
+        return np.zeros(1, np.int64) if task is None else task.do()
+
+    def _is_wanted(self) -> bool:
+        """Whether there is a seat. Waits while a kernel that may offer some has to be compiled, or loaded."""
+        while self.board[_ASKED] and not self.board[_SEATS]:
+            time.sleep(_NAP)
+        return bool(self.board[_SEATS])
+
     def rest(self) -> None:
         """Let nobody linger any more: a thread that comes back while Python ends finds no interpreter."""
-        BELL[0] += 1
+        self.board[_BELL] += 1
         for lock in self._lingering:
             lock.acquire(timeout=1)
 
-    def start(self, tasks: list[_Task], rings: bool) -> None:
+    def start(self, tasks: list[_Task]) -> None:
         self.make_way()
         for task in tasks:
             self.tasks.put(task)
-        if not rings:
-            BELL[0] += 1
+        self.board[_BELL] += 1
+
+    def call(self, kernels: ModuleType, seats: int, kernel: Call, *arguments: object) -> Any:
+        """Call a kernel, with so many seats for others; returns once they have ended."""
+        self.make_way()
+        self.board[_ASKED] = 1  # before looking who is asleep, as they look after saying so
+        for _ in range(min(seats, len(self._asleep))):
+            with suppress(KeyError):  # somebody has woken in the meantime
+                self._asleep.pop()
+                self.tasks.put(None)
+        try:
+            return kernel(self.board, seats, *arguments)
+        finally:
+            self.board[_ASKED] = 0
+            _, interrupt = _insist(lambda: self._let_go(kernels))
+            if interrupt is not None:
+                raise interrupt
+
+    def _let_go(self, kernels: ModuleType) -> None:
+        """Until those who have helped have ended."""
+        while not kernels.are_gone(self.board, _TURNS):
+            time.sleep(_NAP)
 
     def make_way(self) -> None:
         """Keep them off the core of the thread that calls, if it may run on others and the system tells which it is."""
@@ -161,6 +211,30 @@ if hasattr(os, "register_at_fork"):  # not on Windows
     os.register_at_fork(after_in_child=_helpers.cache_clear)  # threads do not survive a fork
 
 
+_NO_BOARD = np.zeros(BOARD, np.int64)
+
+
+def alone(kernel: Call, *arguments: object) -> Any:
+    """Call a kernel that others might help, without any."""
+    return kernel(_NO_BOARD, 0, *arguments)
+
+
+@contextmanager
+def together(threads: int) -> Iterator[Call]:
+    """How to call kernels so that this many threads are at work on each: `alone` if others are being helped already.
+
+    Such a kernel takes the board and a number of seats, and offers those with `kernels.waiting.offer`.
+    """
+    kernels, helpers = _kernels, _helpers() if threads > 1 else None
+    if kernels is None or helpers is None or not helpers.free.acquire(blocking=False):
+        yield alone
+        return
+    try:
+        yield partial(helpers.call, kernels, threads - 1)
+    finally:
+        helpers.free.release()
+
+
 def _do(jobs: list[Job], work: Callable[[Job, int], Done], finished: Callable[[Done], object] | None) -> None:
     for job in jobs:
         result = work(job, 0)
@@ -173,13 +247,11 @@ def share(
     work: Callable[[Job, int], Done],
     threads: int | None = None,
     finished: Callable[[Done], object] | None = None,
-    rings: bool = False,
 ) -> None:
     """Do work(job, worker) for all jobs, in about their order, on so many threads (default: one a core).
 
     The calling thread is one of them, and worker 0. It is also the one that calls finished(result), soon after a job.
-    The first exception ends it all, once the jobs that are being done have ended, and is raised. `rings` says that work
-    rings the bell, in a kernel.
+    The first exception ends it all, once the jobs that are being done have ended, and is raised.
     """
     workers = max(1, min(threads or cores(), len(jobs)))
     if workers == 1:
@@ -204,7 +276,7 @@ def share(
 
     others = [_Task(partial(toil, worker)) for worker in range(1, workers)]
     try:
-        _helpers().start(others, rings)
+        _helpers().start(others)
         toil(0)
     finally:
         failed = True  # if it was interrupted

@@ -19,7 +19,7 @@ from raytracer.image import Depth
 from raytracer.methods import CERTIFIED, Method
 from raytracer.notebook import Picture
 from raytracer.plan import Plan, make_plan
-from raytracer.pool import share
+from raytracer.pool import Call, alone, share, together
 from raytracer.scene import Camera, Light, Materials, Scene, Spheres
 from raytracer.screen import SPARE, Pixels, Screen, make_canvas, make_full_paints, make_paints, open_screen
 from raytracer.shading import to_byte
@@ -118,52 +118,46 @@ class Watch:
     rounds: int = 1  # how often the picture's rows are gone through
     done: int = 0
 
+    def check(self) -> None:
+        """Raise `Cancelled` if it is not."""
+        if self.cancelled is not None and self.cancelled():
+            raise Cancelled
+
+    def tell(self, bands: int, rows: slice) -> None:
+        """One more of so many bands is done, and these rows of the picture."""
+        self.done += 1
+        if self.progress is not None:
+            self.progress(self.done, self.rounds * bands, rows)
+
 
 def share_bands(tracer: Eye | Screen, plan: Plan, watch: Watch, work: Callable[[slice, int], slice]) -> None:
     """Do the work for all rows of the picture, a band at a time, on all threads.
 
     Work returns the rows of the picture that it has finished.
     """
-    share_pieces(tracer.bands(plan.shading), watch, 1, work)
+    share_pieces(tracer.bands(plan.shading), watch, work)
 
 
-def share_pieces(
-    bands: list[slice], watch: Watch, pieces: int, work: Callable[[slice, int], slice], rings: bool = False
-) -> None:
-    """The same for any bands, so many times each: those who are at work on one share what there is to do.
+def share_pieces(bands: list[slice], watch: Watch, work: Callable[[slice, int], slice]) -> None:
+    """The same for any bands."""
 
-    `rings` as in `pool.share`.
-    """
-    left = {rows.start: pieces for rows in bands}
+    def one(rows: slice, worker: int) -> slice:
+        watch.check()
+        return work(rows, worker)
 
-    def one(rows: slice, worker: int) -> tuple[int, slice]:
-        if watch.cancelled is not None and watch.cancelled():
-            raise Cancelled
-        return rows.start, work(rows, worker)
-
-    def tell(done: tuple[int, slice]) -> None:
-        band, rows = done
-        left[band] -= 1
-        if left[band] == 0:
-            watch.done += 1
-            if watch.progress is not None:
-                watch.progress(watch.done, watch.rounds * len(bands), rows)
-
-    share([rows for rows in bands for _ in range(pieces)], one, watch.threads, tell, rings)
+    share(bands, one, watch.threads, lambda rows: watch.tell(len(bands), rows))
 
 
 def _paint(easel: Easel, watch: Watch) -> None:
     """A stage that a kernel paints; numpy paints the pixels that kernels were not certain of."""
     screen, shading = easel.screen, easel.plan.shading
     bands = screen.bands(shading, joint=True)
-    tiles = {rows.start: screen.tiles_of(rows) for rows in bands}
-
-    def paint(rows: slice, worker: int) -> slice:
-        easel.paint(tiles[rows.start], worker)
-        return rows
-
-    share_pieces(bands, watch, screen.workers(shading), paint, rings=True)
-    easel.finish(*range(len(screen.desks)))
+    with together(screen.workers(shading)) as call:
+        for rows in bands:
+            watch.check()
+            easel.paint(screen.tiles_of(rows), call=call)
+            watch.tell(len(bands), rows)
+    easel.finish(*range(screen.threads))
 
 
 @dataclass
@@ -176,9 +170,9 @@ class Easel:
     picture: np.ndarray  # uint8 (rows, width, 3)
     canvas: Canvas  # its bytes
 
-    def paint(self, tiles: Tiles, worker: int) -> None:
+    def paint(self, tiles: Tiles, worker: int = 0, call: Call = alone) -> None:
         """Paint what is left of some tiles, as `Screen.paint` does; `finish` does the rest."""
-        for doubtful in self.screen.paint(self.plan.painter, tiles, worker, self.paints, self.canvas):
+        for doubtful in self.screen.paint(self.plan.painter, tiles, self.paints, self.canvas, worker, call):
             self._decide(doubtful, worker)
 
     def finish(self, *workers: int) -> None:
@@ -216,12 +210,11 @@ def _paint_whole(plan: Plan, screen: Screen, canvas: Canvas, watch: Watch) -> No
         return slice(rows.start, rows.start)
 
     def paint(rows: slice, worker: int) -> slice:
-        scratch = screen.desks[worker].scratch
-        painter(*hits, near, far, rows.start, rows.stop, width, scratch, paints, canvas)
+        painter(*hits, near, far, rows.start, rows.stop, width, screen.desks, worker, paints, canvas)
         return rows
 
     share_bands(screen, plan, watch, find)
-    screen.settle(Hits(t, index), 0, *range(len(screen.desks)))
+    screen.settle(Hits(t, index), 0, *range(screen.threads))
     if screen.unit:
         np.ldexp(t, screen.unit, out=t)  # in the scene's own unit some may be too small or too large for a float64
     painter, (near, far) = getattr(plan.path, plan.painter), plan.reach or screen.range_of(t, index)
@@ -274,7 +267,7 @@ def hits_of(plan: Plan, tracer: Eye | Screen, watch: Watch | None = None, polish
 
     share_bands(tracer, plan, watch or Watch(), trace)
     if isinstance(tracer, Screen):
-        tracer.settle(hits, 0, *range(len(tracer.desks)), polished=polished)
+        tracer.settle(hits, 0, *range(tracer.threads), polished=polished)
         return tracer.in_scene(hits)
     return hits
 

@@ -99,7 +99,7 @@ def _draw_means(fine: Plan, side: int, wanted: np.ndarray, picture: np.ndarray, 
                 _draw_strip(fine, tracer, paints, rows, side, wanted[rows], picture[rows], worker)
             return rows
 
-        share_pieces(strips, watch, 1, one)
+        share_pieces(strips, watch, one)
 
 
 def differing(picture: np.ndarray, depth: Depth = Depth.BYTE) -> np.ndarray:

@@ -2,8 +2,7 @@
 
 Eye rays share their origin, so a sphere covers an ellipse on the screen, and only pixels in its box can hit it:
 
-    bound       the box of each sphere, sixteen at a time, and a record for each tile that it reaches into
-    count, begin, fill  the list of each tile
+    sort        the box of each sphere, sixteen at a time, and the list of each tile that it reaches into
     paint       a tile at a time: a small depth buffer, then colours, while all of it is in the core's first cache
 
 No tree, no ray objects, nothing normalised, and only one square root for a pixel and a sphere. A tile with nothing but
@@ -13,9 +12,10 @@ float64 is not certain are listed, decided by `settle`, and painted anew.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import lru_cache
+from itertools import accumulate, pairwise
 from types import ModuleType
 from typing import NamedTuple
 
@@ -30,6 +30,7 @@ from raytracer.arrays import (
     Bins,
     Candidates,
     Canvas,
+    Desks,
     FineRays,
     FullPaints,
     Glance,
@@ -38,10 +39,9 @@ from raytracer.arrays import (
     Hits,
     Mirrors,
     Paints,
+    Piles,
     Quick,
-    QuickScratch,
     Records,
-    Scratch,
     Seen,
     Sides,
     Slow,
@@ -58,7 +58,7 @@ from raytracer.glance import make_glance
 from raytracer.lookup import light_cells, reach_of, tree_of
 from raytracer.mirrors import NO_MIRRORS, see_mirrors
 from raytracer.plan import Plan
-from raytracer.pool import BELL, cores, share
+from raytracer.pool import Call, alone, cores, together
 from raytracer.quick import make_quick, packed
 from raytracer.scene import Camera, Colour, Light, Materials, Scene, Triangles
 from raytracer.settle import Bundle, Index, Targets, known_in_integers, polish, settled
@@ -70,14 +70,12 @@ SPARE = 8  # elements at the end of arrays that are read eight at a time
 _SPARE_RECORDS = 1 << 10  # beyond those of spheres that reach into one or two tiles
 _SPARE = 32  # list entries beyond the last that a kernel may look at
 _DOUBTS = 1 << 15  # pixels that a thread lists before they are decided
-_FEW = 1 << 15  # spheres below which one thread sorts them sooner than two
-_MOST_WORKERS = 8  # that sort: each counts all tiles anew
+_WORTH_A_PART = 1 << 12  # spheres that are sorted sooner if another thread helps
+_MOST_PARTS = 8  # of what is sorted: for each all tiles are counted anew
 _BAND_PIXELS = 1 << 18  # of a numpy stage's block
 _PIXELS_A_MOMENT, _SPHERES_A_MOMENT = 1 << 22, 1 << 17  # what is drawn in a few milliseconds
 _WORTH_A_THREAD = 8  # a moment
 _MOMENTS_A_PIECE = 4
-_NUMBERS = 1 << 14  # of spheres of a tile, for the blocks that show but one
-_STACK = 8 * 24  # boxes that may wait, eight a level
 _KEPT = 1 << 26  # bytes of a workspace that is kept
 _WORKSPACES = 2  # that are kept, about
 
@@ -88,25 +86,22 @@ class Workspace:
     """Arrays that outlive a picture: fresh memory costs more than drawing a small one."""
 
     def __init__(self) -> None:
-        self._arrays: dict[tuple[str, int], np.ndarray] = {}
+        self._arrays: dict[str, np.ndarray] = {}
         self.nbytes = 0
-        self.desks: dict[int, Desk] = {}  # of the threads
+        self.desks: Desks | None = None  # of the threads
+        self.sorting: tuple[tuple[int, ...], Piles, Bins] | None = None  # room for that, and how many of what it is for
 
-    def array(self, size: int, kind: type, name: str, worker: int = 0) -> np.ndarray:
+    def array(self, size: int, kind: type, name: str) -> np.ndarray:
         """An array of that size, with anything in it."""
-        return self.room(size, kind, name, worker)[:size]
-
-    def room(self, size: int, kind: type, name: str, worker: int = 0) -> np.ndarray:
-        """An array of that size or more."""
-        kept = self._arrays.get((name, worker))
+        kept = self._arrays.get(name)
         if kept is None or len(kept) < size:
             self.nbytes -= 0 if kept is None else kept.nbytes
-            kept = self._arrays[name, worker] = aligned(size, kind)
+            kept = self._arrays[name] = aligned(size, kind)
             self.nbytes += kept.nbytes
-        return kept
+        return kept[:size]
 
-    def zeros(self, size: int, kind: type, name: str, worker: int = 0) -> np.ndarray:
-        array = self.array(size, kind, name, worker)
+    def zeros(self, size: int, kind: type, name: str) -> np.ndarray:
+        array = self.array(size, kind, name)
         array[:] = 0
         return array
 
@@ -125,13 +120,6 @@ def _workspace() -> Iterator[Workspace]:
         _idle.append(workspace)
 
 
-class Desk(NamedTuple):
-    """What one thread works with."""
-
-    scratch: Scratch
-    doubts: np.ndarray  # int64: how many doubtful pixels follow; each as row · width + column
-
-
 class Screen(NamedTuple):
     """A picture's spheres, sorted into the tiles of the screen."""
 
@@ -146,7 +134,8 @@ class Screen(NamedTuple):
     facet_boxes: np.ndarray  # int32 (n, 4), where the triangles are
     targets: Targets
     workspace: Workspace
-    desks: list[Desk]  # one a thread
+    threads: int
+    desks: Desks  # at least one a thread
 
     def bands(self, shading: float = 0.0, joint: bool = False) -> list[slice]:
         """The picture's rows, cut between tiles into pieces that take a moment.
@@ -166,20 +155,20 @@ class Screen(NamedTuple):
 
     def workers(self, shading: float = 0.0) -> int:
         """How many threads are to paint: to wake another takes longer than to do very little."""
-        return min(len(self.desks), 1 + int(_WORTH_A_THREAD * self._moments(shading)))
+        return min(self.threads, 1 + int(_WORTH_A_THREAD * self._moments(shading)))
 
     def _moments(self, shading: float) -> float:
         """How long the picture will take, about, for two cores."""
         pixels = self.raster.height * self.raster.width
         moments = (1 + len(self.slow.ids) + shading / 8) * pixels / _PIXELS_A_MOMENT
-        return moments + len(self.bins.entries) / _SPHERES_A_MOMENT
+        return moments + int(self.bins.starts[-1]) / _SPHERES_A_MOMENT
 
     def tiles_of(self, rows: slice, columns: slice = slice(None)) -> Tiles:
         """The tiles of some rows, which are cut between tiles; or those of the first row of tiles in some columns."""
         height, across = self.kernels.TILE_HEIGHT, self.bins.columns
         first, count = rows.start // height * across, -(-(rows.stop - rows.start) // height) * across
         start, stop, _ = columns.indices(count)
-        return Tiles(np.zeros(APART * len(self.desks), np.int64), first + start, first + stop, 0, BELL)
+        return Tiles(np.zeros(APART * self.threads, np.int64), first + start, first + stop)
 
     def hits(self, rows: slice, worker: int = 0, polished: bool = False) -> Hits:
         """What the rays of these rows, cut between tiles, hit first: as `Eye.hits`."""
@@ -197,7 +186,7 @@ class Screen(NamedTuple):
         """
         out = HitRows(hits.t.reshape(-1), hits.index.reshape(-1), first_row, self.raster.width)
         kernel, paints = ("find_fine_hits", self._fine_rays()) if polished else ("find_hits", _NO_PAINTS)
-        for doubtful in self.paint(kernel, self.tiles_of(rows), worker, paints, out):
+        for doubtful in self.paint(kernel, self.tiles_of(rows), paints, out, worker):
             doubtful.decide(hits, first_row)
 
     @_NOT_A_NUMBER_IS_NO_ERROR
@@ -241,32 +230,31 @@ class Screen(NamedTuple):
         self,
         painter: str,
         tiles: Tiles,
-        worker: int,
         paints: Paints | FullPaints | FineRays,
         out: Canvas | HitRows,
+        worker: int = 0,
+        call: Call = alone,
     ) -> Iterator[Pixels]:
         """Paint by a kernel what nobody has taken yet of some tiles; yields doubtful pixels when their list is full.
 
-        What is left of them `doubtful` tells.
+        What is left of them `doubtful` tells. It is called with `call`, worker 0 having others help.
         """
-        kernel, (scratch, doubts) = getattr(self.kernels, painter), self.desks[worker]
-        tiles = tiles._replace(own=worker % len(self.desks))
-        while not kernel(self.view, self.slow, self.bins, tiles, scratch, doubts, paints, out):
-            yield from self.doubtful(worker)
+        kernel, workers = getattr(self.kernels, painter), [worker] if call is alone else range(self.threads)
+        while not call(kernel, self.view, self.slow, self.bins, tiles, self.desks, worker, paints, out):
+            yield from self.doubtful(*workers)
 
     def colours(self, kernel: str, pixels: Pixels, hits: Hits, paints: Paints | FullPaints, worker: int) -> np.ndarray:
         """The colours of some pixels that hit something: float64 (n, 3)."""
         count = len(pixels.xs)
         eights = [np.resize(array, -(-count // SPARE) * SPARE) for array in (*hits, pixels.xs, pixels.ys)]
         t, index, columns, rows = eights
-        colours, scratch = np.empty((len(t), 3)), self.desks[worker].scratch
-        pixel = columns.astype(np.int32), rows.astype(np.int32)
-        getattr(self.kernels, kernel)(self.view, paints, t, index, *pixel, scratch, colours)
+        colours, pixel = np.empty((len(t), 3)), (columns.astype(np.int32), rows.astype(np.int32))
+        getattr(self.kernels, kernel)(self.view, paints, t, index, *pixel, self.desks, worker, colours)
         return colours[:count]
 
     def doubtful(self, *workers: int) -> Iterator[Pixels]:
         """The doubtful pixels that these workers have listed, all together, if there are any."""
-        lists = [doubts for worker in workers if (doubts := self.desks[worker].doubts)[0]]
+        lists = [doubts for worker in workers if (doubts := self.desks.doubts[worker])[0]]
         if not lists:
             return
         pixels = np.concatenate([doubts[1 : 1 + doubts[0]] for doubts in lists])
@@ -313,13 +301,14 @@ def open_screen(scene: Scene, raster: Raster, kernels: ModuleType, threads: int 
         if len(corners):
             view, boxes = _with_facets(view, workspace, kernels, lens, raster, origin, corners, scene.triangles)
         glance = make_glance(raster, view.kappa)
-        bins, slow_ids = _sort(workspace, kernels, lens, glance, view, len(scene.spheres), boxes, threads)
+        workers = threads or cores()
+        bins, slow_ids = _sort(workspace, kernels, lens, glance, view, len(scene.spheres), boxes, workers)
         slow, targets = _slow(lens, view, origin, balls, slow_ids, kernels)
         targets = targets._replace(corners=corners, order=order)
-        desks = [_desk(workspace, kernels, worker) for worker in range(threads or cores())]
+        desks = _desks(workspace, kernels, workers)
         places = order if len(corners) and len(balls) else None
         size = len(scene.spheres)
-        yield Screen(raster, unit, origin, size, places, view, slow, bins, boxes, targets, workspace, desks)
+        yield Screen(raster, unit, origin, size, places, view, slow, bins, boxes, targets, workspace, workers, desks)
 
 
 @lru_cache(maxsize=64)
@@ -385,11 +374,9 @@ _NO_PAINTS = Paints(
 )
 
 
-_NOBODY = np.zeros(1, np.int64)  # a bell that nobody hears
 _NO_SPHERES = np.empty(0)
 _NO_BOXES = np.empty((0, 4), np.int32)
 _NO_IDS = np.empty(0, np.int32)
-_NO_RECORDS = Records(_NO_IDS, _NO_IDS, _NO_IDS)
 _NONE_SLOW = Slow(np.empty(0, np.int32), _NO_BOXES, Seen(*[_NO_SPHERES] * len(Seen._fields)))
 
 
@@ -410,59 +397,15 @@ def make_canvas(picture: np.ndarray, first_row: int = 0, wanted: np.ndarray = AL
     return Canvas(flat, row, pixel, width if pixel == 3 else width - 1, first_row, wanted)
 
 
-def _desk(workspace: Workspace, kernels: ModuleType, worker: int) -> Desk:
-    """A thread's desk, without what an earlier picture has left on it."""
-    desk = workspace.desks.get(worker)
-    if desk is None:
-        desk = workspace.desks[worker] = _new_desk(workspace, kernels, worker)
-    desk.doubts[0] = 0
-    desk.scratch.doubt[:] = False
-    return desk
-
-
-def _new_desk(workspace: Workspace, kernels: ModuleType, worker: int) -> Desk:
-    size, array = (kernels.TILE_HEIGHT + 1) * kernels.STRIDE, workspace.array
-    scratch = Scratch(
-        array(size, np.float64, "k", worker),
-        array(size, np.int32, "index", worker),
-        array(size, np.bool_, "doubt", worker),
-        array(64, np.float64, "batch", worker),
-        array(_STACK, np.int64, "stack", worker),
-        array(_STACK, np.float64, "near", worker),
-        array(32, np.uint8, "rest", worker),
-        _quick_scratch(workspace, kernels, worker),
-    )
-    return Desk(scratch, array(_DOUBTS, np.int64, "doubts", worker))
-
-
-def _quick_scratch(workspace: Workspace, kernels: ModuleType, worker: int) -> QuickScratch:
-    pixels, blocks = kernels.TILE_HEIGHT * kernels.TILE_WIDTH, kernels.TILE_HEIGHT * kernels.TILE_WIDTH // 16
-    late, room = 2 * pixels, blocks + 4
-
-    def array(size: int, kind: type, name: str) -> np.ndarray:
-        return workspace.zeros(size, kind, f"quick {name}", worker)
-
-    depth = array(pixels, np.float32, "depth")
-    return QuickScratch(
-        depth=depth,
-        colour=depth.view(np.int32),
-        number=array(pixels, np.int32, "number"),
-        doubt=array(pixels // 4, np.int32, "doubt"),
-        doubtful=array(1, np.int64, "doubtful"),
-        table=array(8 * (kernels.MOST + 16), np.float32, "table"),
-        batch=array(160, np.float32, "batch"),
-        numbers=array(_NUMBERS, np.float32, "numbers"),
-        blocks=array(room, np.int32, "blocks"),
-        firsts=array(room, np.int32, "firsts"),
-        mixed=array(room, np.int32, "mixed"),
-        columns=array(8 * 32, np.float32, "columns"),
-        close=array(room, np.int32, "close"),
-        bits=array(room, np.int32, "bits"),
-        late=array(1, np.int64, "late"),
-        late_columns=array(late, np.int32, "late columns"),
-        late_rows=array(late, np.int32, "late rows"),
-        spheres=array(late, np.int32, "spheres"),
-    )
+def _desks(workspace: Workspace, kernels: ModuleType, workers: int) -> Desks:
+    """Desks for so many threads or more, without the doubts of an earlier picture."""
+    desks = workspace.desks
+    if desks is None or len(desks.memory) < workers:
+        memory = workspace.zeros(workers * kernels.DESK, np.uint8, "desks").reshape(workers, -1)
+        doubts = workspace.array(workers * _DOUBTS, np.int64, "doubts").reshape(workers, -1)
+        desks = workspace.desks = Desks(memory, doubts)
+    desks.doubts[:, 0] = 0
+    return desks
 
 
 def _view(raster: Raster, origin: np.ndarray, balls: np.ndarray, material: np.ndarray) -> View:
@@ -517,71 +460,45 @@ def _sort(
     view: View,
     spheres: int,
     facet_boxes: np.ndarray,
-    threads: int | None,
+    threads: int,
 ) -> tuple[Bins, np.ndarray]:
     """The lists of all tiles; and the slow spheres, which are in none."""
-    columns = -(-(len(view.across) - 8) // kernels.TILE_WIDTH)
+    columns = -(-(len(view.across) - SPARE) // kernels.TILE_WIDTH)
     rows = -(-(len(view.up) - 1) // kernels.TILE_HEIGHT)
-    workers = 1 if spheres < _FEW else min(threads or cores(), _MOST_WORKERS)
-    cuts = [spheres * worker // workers // 8 * 8 for worker in range(workers)] + [spheres]
-    counts = workspace.zeros((workers + 1) * columns * rows, np.int64, "counts").reshape(workers + 1, -1)
-    starts = workspace.array(columns * rows + 1, np.int64, "starts")
-    parts, bell = [_NO_PART] * (workers + 1), BELL if workers > 1 else _NOBODY
-
-    def bound(part: int, worker: int) -> None:
-        first, last = cuts[part], cuts[part + 1]
-        slow = workspace.array(last - first, np.int32, "slow", part)
-        boxes = workspace.array(64, np.int32, "boxes", part)
-
-        def find(room: Records) -> tuple[int, int]:
-            found: tuple[int, int] = kernels.bound(
-                glance, lens, view.eye, view.reach, view.kappa, view.balls, first, last, columns, room, slow, boxes,
-                bell,
-            )  # fmt: skip
-            return found
-
-        count(part, find, (last - first) * 9 // 8 + _SPARE_RECORDS, slow)
-
-    def count(part: int, find: Callable[[Records], tuple[int, int]], guess: int, slow: np.ndarray = _NO_IDS) -> None:
-        records = _records(workspace, part, guess)
-        end, slows = find(records)
-        if end + kernels.SIXTEEN > len(records.tiles):  # then not all are there
-            records = _records(workspace, part, end + kernels.SIXTEEN)
-            find(records)
-        parts[part] = _Part(records, end, slow[:slows])
-        kernels.count(records, end, counts[part])
-
-    def fill(part: int, worker: int) -> None:
-        kernels.fill(parts[part].records, parts[part].end, counts[part], entries, bell)
-
-    share(list(range(workers)), bound, threads, rings=True)
-    if len(facet_boxes):
-        boxes, first = facet_boxes.reshape(-1), view.first_facet
-        count(workers, lambda room: (kernels.record_boxes(boxes, first, columns, room), 0), 2 * len(facet_boxes))
-    kernels.begin(counts, starts)
-    middles = workspace.array(columns * rows, np.int64, "middles")
-    middles[:] = counts[workers]
-    entries = workspace.array(int(starts[-1]) + _SPARE, np.uint64, "entries")
-    entries[int(starts[-1]) :] = 0
-    share(list(range(workers)), fill, threads, rings=True)
-    if len(facet_boxes):
-        fill(workers, 0)
-    return Bins(starts, entries, middles, columns), np.concatenate([part.slow for part in parts])
+    parts = min(threads, 1 + spheres // _WORTH_A_PART, _MOST_PARTS)
+    key = parts, spheres, len(facet_boxes), columns, rows
+    if workspace.sorting is None or workspace.sorting[0] != key:
+        workspace.sorting = key, *_piles(workspace, *key)
+    _, piles, bins = workspace.sorting
+    with together(parts) as call:
+        while not call(kernels.sort, glance, lens, view, facet_boxes.reshape(-1), piles, bins):
+            workspace.sorting = key, *_piles(workspace, *key, (piles.found[:, 0] + kernels.SIXTEEN).tolist())
+            _, piles, bins = workspace.sorting
+    slow = zip(piles.cuts, piles.found[:parts, 1].tolist(), strict=False)
+    return bins, np.concatenate([_NO_IDS, *(piles.slow[first : first + count] for first, count in slow if count)])
 
 
-class _Part(NamedTuple):
-    """What a thread has found of its part of the shapes."""
-
-    records: Records
-    end: int  # how many there are of them
-    slow: np.ndarray  # int32, which spheres are slow
-
-
-_NO_PART = _Part(_NO_RECORDS, 0, _NO_IDS)
-
-
-def _records(workspace: Workspace, part: int, size: int) -> Records:
-    return Records(*(workspace.room(size, np.int32, f"records' {name}", part) for name in Records._fields))
+def _piles(
+    workspace: Workspace, parts: int, spheres: int, facets: int, columns: int, rows: int, sizes: list[int] | None = None
+) -> tuple[Piles, Bins]:
+    """Room to sort, for so many records of each part."""
+    array, tiles = workspace.array, columns * rows
+    cuts = [spheres * part // parts // SPARE * SPARE for part in range(parts)] + [spheres]
+    if sizes is None:
+        sizes = [(last - first) * 9 // 8 + _SPARE_RECORDS for first, last in pairwise(cuts)]
+        sizes += [2 * facets + _SPARE_RECORDS] if facets else []
+    parts, rooms = len(sizes), [0, *accumulate(sizes)]
+    piles = Piles(
+        np.array(cuts), np.array(rooms),
+        Records(*(array(rooms[-1], np.int32, f"records' {name}") for name in Records._fields)),
+        array(spheres, np.int32, "slow"),
+        array(64 * parts, np.int32, "boxes").reshape(parts, -1),
+        array(2 * parts, np.int64, "found").reshape(parts, -1),
+        array(parts * tiles, np.int64, "counts").reshape(parts, -1),
+        array(4 * APART, np.int64, "progress"),
+    )  # fmt: skip
+    starts, middles = array(tiles + 1, np.int64, "starts"), array(tiles, np.int64, "middles")
+    return piles, Bins(starts, array(rooms[-1] + _SPARE, np.uint64, "entries"), middles, columns)
 
 
 def _slow(

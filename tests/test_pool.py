@@ -4,16 +4,23 @@ import os
 import subprocess
 import sys
 import threading
+import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from raytracer import backend, plain
-from raytracer.pool import share
+from raytracer.arrays import BOARD
+from raytracer.pool import alone, share, together
 
 KERNELS = backend.load()
 ROOT = Path(__file__).parent.parent
+compiled = pytest.mark.skipif(KERNELS is plain, reason="numba is not installed")
+several_cores = pytest.mark.skipif(
+    not hasattr(os, "sched_getaffinity") or len(os.sched_getaffinity(0)) < 2, reason="no core to spare"
+)
 
 
 @pytest.mark.parametrize("threads", [1, 2, 5, None])
@@ -32,7 +39,7 @@ def test_every_job_is_done_once_and_told_of_by_the_caller(threads):
     assert max(worker for _, worker, _ in done) < (threads or 100)
 
 
-@pytest.mark.skipif(not hasattr(os, "sched_getaffinity") or len(os.sched_getaffinity(0)) < 2, reason="no core to spare")
+@several_cores
 def test_helpers_are_kept_off_the_core_of_whoever_calls():
     """Else some pictures take twice as long, with a core idle."""
     helpers, both = {}, threading.Barrier(2, timeout=5)
@@ -51,7 +58,7 @@ def test_helpers_are_kept_off_the_core_of_whoever_calls():
         assert len(cores) == len(allowed) - 1
 
 
-@pytest.mark.skipif(not hasattr(os, "sched_getaffinity") or len(os.sched_getaffinity(0)) < 2, reason="no core to spare")
+@several_cores
 def test_a_caller_that_keeps_to_one_core_does_not_keep_the_helpers_there():
     allowed, both = os.sched_getaffinity(0), threading.Barrier(2, timeout=5)
 
@@ -74,25 +81,23 @@ def test_a_caller_that_keeps_to_one_core_does_not_keep_the_helpers_there():
     assert len(helper_cores()[0]) == len(allowed) - 1
 
 
-@pytest.mark.skipif(KERNELS is plain, reason="numba is not installed")
+@compiled
 def test_who_lingers_says_first_that_the_task_has_ended_and_goes_when_the_bell_rings():
-    ended, bell = np.zeros(1, np.int64), np.zeros(1, np.int64)
+    ended, board = np.zeros(1, np.int64), np.zeros(BOARD, np.int64)
     assert not KERNELS.has_ended(ended, 10)
-    thread = threading.Thread(target=KERNELS.linger, args=(ended, bell, 1 << 40), daemon=True)
+    thread = threading.Thread(target=KERNELS.linger, args=(ended, board, 1 << 40), daemon=True)
     thread.start()
     assert KERNELS.has_ended(ended, 1 << 40)
     thread.join(0.05)
     assert thread.is_alive()
-    bell[0] += 1
+    board[0] += 1
     thread.join(5)
     assert not thread.is_alive()
-    KERNELS.linger(ended, bell, 10)  # and not for ever
+    KERNELS.linger(ended, board, 10)  # and not for ever
 
 
-@pytest.mark.skipif(KERNELS is plain, reason="numba is not installed")
-@pytest.mark.parametrize("rings", [True, False])
-def test_helpers_that_linger_help_again(rings):
-    """Whoever says that work rings the bell and does not only waits for the helpers a little longer."""
+@compiled
+def test_helpers_that_linger_help_again():
     helped, both = [], threading.Barrier(2, timeout=5)
 
     def work(job, worker):
@@ -100,11 +105,105 @@ def test_helpers_that_linger_help_again(rings):
         helped.append(worker)
 
     for _ in range(20):
-        share([0, 1], work, 2, rings=rings)
+        share([0, 1], work, 2)
     assert sorted(helped) == [0] * 20 + [1] * 20
 
 
-@pytest.mark.skipif(KERNELS is plain, reason="numba is not installed")
+if KERNELS is not plain:
+    from raytracer.kernels.compiler import borrowing
+    from raytracer.kernels.waiting import add, becomes, offer
+
+    @borrowing
+    def _arrive(seats_taken, here, expected, seat):
+        """Say that this seat is taken, and wait a while until so many threads have said so."""
+        seats_taken[seat] += 1
+        add(here, 0, 1)
+        return becomes(here, 0, expected, 1 << 24)
+
+    @borrowing
+    def offer_and_go(board, seats_taken, here):
+        offer(board, 1, _arrive, (seats_taken, here, 2))
+
+    @borrowing
+    def _meet(board, seats, seats_taken, here, expected):
+        offer(board, seats, _arrive, (seats_taken, here, expected))
+        return _arrive(seats_taken, here, expected, 0)
+
+
+def meet(call, taken, expected):
+    """Whether so many threads have met in a kernel; `taken` counts who sat where."""
+    return call(_meet, taken, np.zeros(1, np.int64), expected)
+
+
+@several_cores
+@compiled
+@pytest.mark.parametrize("pause", [0, 0.05, 0.2], ids=["lingering", "asleep", "long asleep"])
+def test_a_kernel_is_helped_by_who_lingers_and_by_who_is_asleep(pause):
+    taken = np.zeros(2, np.int64)
+    for _ in range(5):
+        time.sleep(pause)
+        with together(2) as call:
+            assert meet(call, taken, 2)
+            assert meet(call, taken, 2)
+    assert taken.tolist() == [10, 10]
+
+
+@compiled
+def test_seats_that_nobody_has_claimed_are_withdrawn():
+    board, taken = np.zeros(BOARD, np.int64), np.zeros(9, np.int64)
+    assert _meet(board, 8, taken, np.zeros(1, np.int64), 1)
+    assert KERNELS.are_gone(board, 1)
+    KERNELS.linger(np.zeros(1, np.int64), board, 100)
+    assert taken.tolist() == [1] + [0] * 8
+
+
+@compiled
+def test_who_has_claimed_a_seat_is_waited_for():
+    board, taken, here = np.zeros(BOARD, np.int64), np.zeros(2, np.int64), np.zeros(1, np.int64)
+    thread = threading.Thread(target=KERNELS.linger, args=(np.zeros(1, np.int64), board, 1 << 20), daemon=True)
+    thread.start()
+    offer_and_go(board, taken, here)
+    while not taken[1]:
+        time.sleep(0.001)
+    assert not KERNELS.are_gone(board, 1000)
+    here[0] = 2
+    assert KERNELS.are_gone(board, 1 << 40)
+    board[0] += 1
+    thread.join(5)
+
+
+@compiled
+def test_who_cannot_be_helped_is_alone():
+    with together(1) as call:
+        assert call is alone
+    with together(2) as call, together(2) as other:
+        assert call is not alone
+        assert other is alone
+        assert meet(other, np.zeros(1, np.int64), 1)
+    with together(2) as call:
+        assert call is not alone
+
+
+@several_cores
+@compiled
+def test_an_interrupt_is_raised_once_the_helpers_have_ended(monkeypatch):
+    taken, board = np.zeros(2, np.int64), []
+
+    def are_gone(array, turns):
+        if not board:
+            board.append(array)
+            raise KeyboardInterrupt
+        return KERNELS.are_gone(array, turns)
+
+    with pytest.raises(KeyboardInterrupt), together(2) as call:
+        call.func.__self__.call(SimpleNamespace(are_gone=are_gone), 1, _meet, taken, np.zeros(1, np.int64), 2)
+    assert taken.tolist() == [1, 1]
+    assert KERNELS.are_gone(board[0], 1)
+    with together(2) as call:
+        assert meet(call, taken, 2)
+
+
+@compiled
 def test_nobody_lingers_while_python_ends():
     """In a process of its own, whose helpers would linger for ever."""
     program = (

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from raytracer import backend, make_plan, plain
-from raytracer.arrays import Tile
+from raytracer.arrays import Desks, Tile
 from raytracer.bench import spread
 from raytracer.plan import Plan
+from raytracer.pool import alone
 from raytracer.quick import U, coarseness_of, error_of, flatness_of, flattest_of, make_quick, near_of
 from raytracer.render import draw
 from raytracer.scene import Camera, Light, Materials, Scene, Spheres
@@ -322,10 +323,11 @@ def painted(plan: Plan, room: int = 40_000):
     """What `paint_diffuse` makes of a plan: whether it is done, which doubts are left, and how many there were."""
     with open_screen(plan.scene, plan.raster, KERNELS, 1) as screen:
         paints, picture = make_paints(plan, screen), np.zeros((plan.raster.height, plan.raster.width, 3), np.uint8)
-        doubts, end = np.full(room, -7, np.int64), len(screen.desks[0].doubts)
+        doubts, end = np.full(room, -7, np.int64), screen.desks.doubts.shape[1]
         doubts[0] = 0
-        desk, tiles = screen.desks[0]._replace(doubts=doubts[:end]), screen.tiles_of(slice(0, plan.raster.height))
-        done = KERNELS.paint_diffuse(screen.view, screen.slow, screen.bins, tiles, *desk, paints, make_canvas(picture))
+        desks, tiles = Desks(screen.desks.memory, doubts[None, :end]), screen.tiles_of(slice(0, plan.raster.height))
+        picture_of = screen.view, screen.slow, screen.bins, tiles, desks, 0, paints, make_canvas(picture)
+        done = alone(KERNELS.paint_diffuse, *picture_of)
     assert paints.quick.usable
     assert (doubts[end:] == -7).all()
     return done, doubts[1 : 1 + doubts[0]].tolist(), int((doubts[1:end] != -7).sum()), picture

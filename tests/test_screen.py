@@ -121,7 +121,7 @@ def boxes_of(scene, raster, usable):
             room = Records(*(np.full(size, -1, np.int32) for _ in range(3)))
             found = KERNELS.bound(
                 glance._replace(usable=usable), make_lens(raster), view.eye, view.reach, view.kappa, view.balls, 0,
-                count, columns, room, slow, spare, np.zeros(1, np.int64),
+                count, columns, room, slow, spare,
             )  # fmt: skip
             return room, found
 

@@ -3,14 +3,15 @@
 from raytracer.kernels.compiler import cache_named_after_sources
 
 with cache_named_after_sources():
-    from raytracer.kernels.bounds import TILE_HEIGHT, TILE_WIDTH, begin, bound, count, fill, record_boxes
+    from raytracer.kernels.bounds import TILE_HEIGHT, TILE_WIDTH, bound
     from raytracer.kernels.bvh import along_curve, build, candidates_in_tree, enclose, nearest_in_tree
     from raytracer.kernels.cells import bound_images, sort_into_cells
+    from raytracer.kernels.desks import DESK
     from raytracer.kernels.facets import see_facets
     from raytracer.kernels.full import radiance_of
     from raytracer.kernels.lanes import SIXTEEN
-    from raytracer.kernels.quick import MOST
     from raytracer.kernels.reading import read_plain
+    from raytracer.kernels.sorting import sort
     from raytracer.kernels.surfaces import diffuse_of
     from raytracer.kernels.tiles import (
         ROOM,
@@ -25,28 +26,25 @@ with cache_named_after_sources():
     )
     from raytracer.kernels.trace import fine_rays, nearest_given, nearest_twofold, polish, refine_given
     from raytracer.kernels.usual import usual_eye, usual_given
-    from raytracer.kernels.visibility import STRIDE, candidates
-    from raytracer.kernels.waiting import has_ended, linger
+    from raytracer.kernels.visibility import candidates
+    from raytracer.kernels.waiting import are_gone, has_ended, linger
     from raytracer.kernels.whole import mean_of_blocks, paint_depth, paint_edges, range_of
 
 __all__ = [
-    "MOST",
+    "DESK",
     "ROOM",
     "SIXTEEN",
-    "STRIDE",
     "TILE_HEIGHT",
     "TILE_WIDTH",
     "along_curve",
-    "begin",
+    "are_gone",
     "bound",
     "bound_images",
     "build",
     "candidates",
     "candidates_in_tree",
-    "count",
     "diffuse_of",
     "enclose",
-    "fill",
     "find_fine_hits",
     "find_hits",
     "fine_rays",
@@ -68,9 +66,9 @@ __all__ = [
     "radiance_of",
     "range_of",
     "read_plain",
-    "record_boxes",
     "refine_given",
     "see_facets",
+    "sort",
     "sort_into_cells",
     "usual_eye",
     "usual_given",

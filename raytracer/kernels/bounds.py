@@ -3,7 +3,7 @@
     balls   x y z r | x y z r | …      float64, the scene's own, flat
       ↓ bound
     records   tile | corners | shape    int32 each, one for each tile that a sphere's box reaches into
-      ↓ count, begin, fill
+      ↓ sort
     entries   the list of each tile, see `Bins`
 
 Single precision does it (the formulas and their errors are those of `glance`), and float64 those sixteen among which
@@ -22,7 +22,6 @@ from raytracer.kernels.lanes import (
     all_of,
     any_of,
     bits_of,
-    fetch_to_write,
     load_rows,
     store,
     store_boxes,
@@ -41,7 +40,6 @@ from raytracer.kernels.sixteen import (
     times_plus,
     whole_numbers,
 )
-from raytracer.kernels.waiting import ring
 from raytracer.quick import FARTHEST, NEAREST
 from raytracer.twofold import select
 
@@ -56,14 +54,13 @@ _ZERO, _UNIT, _FOUR = np.float32(0.0), np.float32(1.0), np.float32(4.0)
 
 
 @borrowing
-def bound(near, lens, eye, reach, kappa, balls, first, last, columns, records, slow, boxes, bell):
+def bound(near, lens, eye, reach, kappa, balls, first, last, columns, records, slow, boxes):
     """Records of spheres first to last − 1, first being a multiple of 8, and in `slow` which of them are slow.
 
     Returns how many records there are, or would be if there was room for them and SIXTEEN more, and how many slow ones.
     balls has room for whole eights, slow for all of those spheres, boxes for 64 numbers; columns is how many tiles lie
     side by side.
     """
-    ring(bell)
     end, slows, i = 0, 0, np.uint64(first)
     while i < last:
         odd = np.int32(_ALL)
@@ -202,38 +199,3 @@ def record_boxes(boxes, first, columns, records):
     for k in range(np.uint64(len(boxes) // 4)):
         end = _record(boxes, np.uint64(4) * k, np.uint64(1), np.int32(first + k), columns, records, end)
     return end
-
-
-@borrowing
-def count(records, end, counts):
-    """Count the records of each tile."""
-    for k in range(np.uint64(end)):
-        counts[np.uint64(records.tiles[k])] += 1
-
-
-@borrowing
-def begin(counts, starts):
-    """Where each tile's list begins, from counts (threads, tiles), which become where each thread's part of it begins.
-
-    starts has one element more than there are tiles.
-    """
-    total = 0
-    for tile in range(counts.shape[1]):
-        starts[tile] = total
-        for thread in range(counts.shape[0]):
-            count = counts[thread, tile]
-            counts[thread, tile] = total
-            total += count
-    starts[-1] = total
-
-
-@borrowing
-def fill(records, end, places, entries, bell):
-    """Put records into the lists of their tiles; `places` is where each list goes on."""
-    ring(bell)
-    for k in range(np.uint64(end)):
-        tile = np.uint64(records.tiles[k])
-        place = np.uint64(places[tile])
-        entries[place] = np.uint64(np.uint32(records.corners[k])) << np.uint64(32) | np.uint64(records.shapes[k])
-        fetch_to_write(entries, place + np.uint64(8))
-        places[tile] = place + np.uint64(1)

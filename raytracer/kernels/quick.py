@@ -19,6 +19,7 @@ from raytracer.certified import approach, inner
 from raytracer.kernels.alike import shade_alike, shade_alike_unchecked, tabulate
 from raytracer.kernels.bounds import TILE_HEIGHT, TILE_WIDTH
 from raytracer.kernels.compiler import borrowing, inlined, variant
+from raytracer.kernels.desks import MOST
 from raytracer.kernels.lanes import (
     SIXTEEN,
     WIDTH,
@@ -79,7 +80,6 @@ from raytracer.quick import FARTHEST, LIGHT, NEAREST, ONE_BYTE, coarseness_of, e
 from raytracer.shading import to_byte
 from raytracer.twofold import select
 
-MOST = 1 << 12  # spheres of a tile's list; of more, the table would leave the core's caches
 FEW_LATE = 256  # pixels to be shaded in float64: enough for a while
 _MIDDLE, _MIDDLE_Y = TILE_WIDTH // 2, TILE_HEIGHT // 2
 _ONE, _SIXTEEN = np.uint64(1), np.uint64(SIXTEEN)

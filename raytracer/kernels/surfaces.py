@@ -9,6 +9,7 @@ import numpy as np
 
 from raytracer.certified import approach
 from raytracer.kernels.compiler import inlined, variant
+from raytracer.kernels.desks import desk_of
 from raytracer.kernels.lanes import WIDTH, at_least, first_of, gather, gather_rows, load, same, spread, store
 from raytracer.kernels.visibility import from_eye
 from raytracer.shading import cosine, land, land_on_any, towards
@@ -89,8 +90,9 @@ def _surface_of_hits(view, d, t, _, where):
     return land_on_any(t, d, view.eye, ball_of(view, where), at_least(where, view.first_facet))
 
 
-def colours_of_hits(view, paints, t, index, columns, rows, scratch, out):
+def colours_of_hits(view, paints, t, index, columns, rows, desks, worker, out):
     """The colours of single hits, float64 (n, 3): t, index and pixels are arrays of whole eights."""
+    scratch = desk_of(desks.memory, worker)
     for k in range(np.uint64(0), np.uint64(len(t)), np.uint64(WIDTH)):
         _, _, d = rays_of(view, load(rows, k), load(columns, k))
         red, green, blue = colours(view, paints, d, load(t, k), load(columns, k), load(index, k), scratch)

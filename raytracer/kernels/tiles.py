@@ -13,6 +13,7 @@ from raytracer.arrays import APART, Tile
 from raytracer.certified import fine_direction, refine
 from raytracer.kernels.bounds import TILE_HEIGHT, TILE_WIDTH
 from raytracer.kernels.compiler import borrowing, inlined, variant
+from raytracer.kernels.desks import desk_of
 from raytracer.kernels.doubts import decide_diffuse, decide_flat, leave_doubts
 from raytracer.kernels.full import radiance
 from raytracer.kernels.lanes import (
@@ -42,7 +43,7 @@ from raytracer.kernels.quick import (
 from raytracer.kernels.strips import fetch_row, put_pixel, start_of
 from raytracer.kernels.surfaces import ball_of, diffuse_of_any, diffuse_of_spheres, line_of, normal, ray_of
 from raytracer.kernels.visibility import STRIDE, list_doubts, see_tile, see_tile_unchecked
-from raytracer.kernels.waiting import ring
+from raytracer.kernels.waiting import offer
 from raytracer.shading import to_byte
 from raytracer.twofold import select
 
@@ -51,13 +52,20 @@ _ROWS_AHEAD = 6  # that the processor fetches, where it does nothing but to writ
 ROOM = 3 * TILE_WIDTH * TILE_HEIGHT + FEW_LATE
 
 
-def _paint(view, slow, bins, tiles, scratch, doubts, paints, out):
-    """Paint tiles, as long as there are any and there is room for doubts; returns whether all are done, or taken."""
+def _paint(board, seats, view, slow, bins, tiles, desks, worker, paints, out):
+    """Paint tiles, as long as there are any and there is room for doubts; others may help: see `offer`.
+
+    Returns whether the caller still has room, so that all tiles are done, or taken.
+    """
+    offer(board, seats, work, (view, slow, bins, tiles, desks, paints, out))
+    return work(view, slow, bins, tiles, desks, paints, out, worker)
+
+
+def _work(view, slow, bins, tiles, desks, paints, out, worker):
+    """What each thread does for that, its number being that of its row of the desks."""
     align_stack()
-    ring(tiles.bell)
-    if len(doubts) - doubts[0] <= ROOM:
-        return False
-    number = _take(tiles)
+    scratch, doubts = desk_of(desks.memory, worker), desks.doubts[worker]
+    number = _take(tiles, worker) if _has_room(doubts) else -1
     while number >= 0:
         tile = _tile(view, bins, number)
         if len(slow.ids) == 0 and bins.starts[number] == bins.starts[number + 1]:
@@ -66,24 +74,29 @@ def _paint(view, slow, bins, tiles, scratch, doubts, paints, out):
             if see(view, slow, bins, tile, scratch):
                 list_doubts(view, tile, scratch, doubts)
             paint_tile(view, scratch, tile, paints, out)
-        full = len(doubts) - doubts[0] <= ROOM
-        number = -1 if full else _take(tiles)
-        if number < 0 or scratch.quick.late[0] > FEW_LATE:
+        full = not _has_room(doubts)
+        if full or scratch.quick.late[0] > FEW_LATE:
             finish(view, paints, scratch, doubts, out)
-        if number < 0:
-            decide(view, slow, bins, paints, scratch, doubts, out)
         if full:
-            return False
-    return True
+            decide(view, slow, bins, paints, scratch, doubts, out)
+        number = _take(tiles, worker) if _has_room(doubts) else -1
+    finish(view, paints, scratch, doubts, out)
+    decide(view, slow, bins, paints, scratch, doubts, out)
+    return _has_room(doubts)
+
+
+@inlined
+def _has_room(doubts):
+    return len(doubts) - doubts[0] > ROOM
 
 
 @borrowing
-def _take(tiles):
+def _take(tiles, worker):
     """The number of a tile that nobody has taken, −1 if there is none."""
     runs = len(tiles.taken) // APART
     length = (tiles.last - tiles.first + runs - 1) // runs
     for turn in range(runs):
-        run = (tiles.own + turn) % runs
+        run = (worker + turn) % runs
         start, taken = tiles.first + run * length, np.uint64(run * APART)
         end = min(start + length, tiles.last)
         if start + take_number(tiles.taken, taken) < end:
@@ -253,10 +266,11 @@ def _painter(
     name, paint_tile, fill_tile=_fill_tile, see=see_tile, paint_quickly=never_quickly, finish=nothing_left,
     decide=leave_doubts,
 ):  # fmt: skip
-    return variant(
-        _paint, name, paint_tile=paint_tile, fill_tile=fill_tile, see=see, paint_quickly=paint_quickly, finish=finish,
-        decide=decide,
+    work = variant(
+        _work, f"{name}_work", paint_tile=paint_tile, fill_tile=fill_tile, see=see, paint_quickly=paint_quickly,
+        finish=finish, decide=decide,
     )  # fmt: skip
+    return variant(_paint, name, work=work)
 
 
 paint_flat = _painter("paint_flat", _flat_tile, paint_quickly=flat_quickly, decide=decide_flat)

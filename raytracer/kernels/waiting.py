@@ -1,45 +1,77 @@
-"""Threads that wait for each other for a moment, without the interpreter and without going to sleep.
+"""Threads that wait for each other for a moment, and help each other, without the interpreter and without sleeping.
 
 To be woken takes the system 0.1 ms, and the interpreter, which lets only one thread at it, as long again.
 
-    caller   ── kernel: rings ────────────────────── has_ended ──
-    helper   ── linger ──┐                          ┌── linger ──
-                         └─ takes the task: kernel ─┘
+    caller   ── kernel: offers seats ─ takes part ──────── are_gone ──   board   bell, asked | seats | busy | work | …
+    helper   ── linger ──────┐                       ┌── linger ──
+                             └ claims one: takes part ┘
+
+Whoever offers work writes it on the board, and how many may help. Who claims a seat before it is withdrawn does the
+same work with the same arguments, and the seat's number; so the caller keeps those until all have ended.
 """
 
-import numpy as np
 from llvmlite import ir
 from numba.core import types
 from numba.core.cgutils import get_or_insert_function
 from numba.extending import intrinsic
 
+from raytracer.arrays import APART, BOARD
 from raytracer.kernels.compiler import borrowing, inlined
-from raytracer.kernels.lanes import PROCESSOR, take_number
+from raytracer.kernels.lanes import PROCESSOR
 
 _ALIGNED = 8
-_FIRST = np.uint64(0)
+_BELL, _SEATS, _BUSY, _WORK, _ARGUMENTS = (APART * place for place in range(5))  # on the board
+_ASKED = _BELL + 1  # whether a kernel has been called that may offer seats, and has not yet
+_WORD = ir.IntType(64)
+
+
+def _place(context, builder, array_type, array, at):
+    return builder.gep(context.make_array(array_type)(context, builder, array).data, [at])
 
 
 @intrinsic
-def _seen(typing, array):
-    """The first element of an int64 array, to which another thread may write at any time."""
+def seen(typing, array, at):
+    """An element of an int64 array, to which another thread may write at any time."""
 
     def lower(context, builder, sig, args):
-        return builder.load_atomic(context.make_array(sig.args[0])(context, builder, args[0]).data, "acquire", _ALIGNED)
+        return builder.load_atomic(_place(context, builder, sig.args[0], *args), "acquire", _ALIGNED)
 
-    return types.int64(array), lower
+    return types.int64(array, types.int64), lower
 
 
 @intrinsic
-def _show(typing, array, number):
+def show(typing, array, at, number):
     """Let other threads see a number there, and all that has been written before."""
 
     def lower(context, builder, sig, args):
-        array, number = args
-        builder.store_atomic(number, context.make_array(sig.args[0])(context, builder, array).data, "release", _ALIGNED)
+        array, at, number = args
+        builder.store_atomic(number, _place(context, builder, sig.args[0], array, at), "release", _ALIGNED)
         return context.get_dummy_value()
 
-    return types.void(array, types.int64), lower
+    return types.void(array, types.int64, types.int64), lower
+
+
+@intrinsic
+def add(typing, array, at, number):
+    """Add to an element that others may change; returns what it was."""
+
+    def lower(context, builder, sig, args):
+        array, at, number = args
+        return builder.atomic_rmw("add", _place(context, builder, sig.args[0], array, at), number, "acq_rel")
+
+    return types.int64(array, types.int64, types.int64), lower
+
+
+@intrinsic
+def _replace(typing, array, at, before, after):
+    """Write a number if another is there; returns whether it was."""
+
+    def lower(context, builder, sig, args):
+        array, at, before, after = args
+        place = _place(context, builder, sig.args[0], array, at)
+        return builder.extract_value(builder.cmpxchg(place, before, after, "acq_rel", "acquire"), 1)
+
+    return types.boolean(array, types.int64, types.int64, types.int64), lower
 
 
 @intrinsic
@@ -55,31 +87,126 @@ def _pause(typing):
     return types.void(), lower
 
 
+_BY_ADDRESS = types.voidptr, types.int64  # what a function is given that is called so: where arguments are, and a seat
+
+
+@intrinsic
+def _write_work(typing, board, work, arguments):
+    """Write on the board what is to be done: work(*arguments, seat)."""
+    signature = work.get_call_type(typing, (*arguments.types, types.int64), {})
+
+    def lower(context, builder, sig, args):
+        value, (board, _, arguments) = context.get_value_type(sig.args[2]), args
+        if (size := context.get_abi_sizeof(value)) > 8 * (BOARD - _ARGUMENTS):
+            raise ValueError(f"found {size} bytes of arguments, expected {8 * (BOARD - _ARGUMENTS)} at most")
+        kind = context.call_conv.get_function_type(types.none, _BY_ADDRESS)
+        function = ir.Function(builder.module, kind, f"{builder.function.name}.by_a_helper")
+        function.linkage = "internal"
+        inner = ir.IRBuilder(function.append_basic_block())
+        where, seat = context.call_conv.get_arguments(function)
+        given = inner.load(inner.bitcast(where, value.as_pointer()), align=_ALIGNED)
+        each = [inner.extract_value(given, k) for k in range(len(signature.args) - 1)]
+        context.get_function(work, signature)(inner, (*each, seat))
+        context.call_conv.return_value(inner, context.get_dummy_value())
+
+        def place(k):
+            return _place(context, builder, sig.args[0], board, ir.Constant(_WORD, k))
+
+        builder.store(builder.ptrtoint(function, _WORD), place(_WORK))
+        builder.store(arguments, builder.bitcast(place(_ARGUMENTS), value.as_pointer()), align=_ALIGNED)
+        return context.get_dummy_value()
+
+    return types.void(board, work, arguments), lower
+
+
+@intrinsic
+def _do_work(typing, board, seat):
+    """Do what is written on the board."""
+
+    def lower(context, builder, sig, args):
+        (board, seat), conv = args, context.call_conv
+
+        def place(k):
+            return _place(context, builder, sig.args[0], board, ir.Constant(_WORD, k))
+
+        kind = conv.get_function_type(types.none, _BY_ADDRESS).as_pointer()
+        function = builder.inttoptr(builder.load(place(_WORK)), kind)
+        where = builder.bitcast(place(_ARGUMENTS), ir.IntType(8).as_pointer())
+        conv.call_function(builder, function, types.none, _BY_ADDRESS, (where, seat))
+        return context.get_dummy_value()
+
+    return types.void(board, types.int64), lower
+
+
 @inlined
-def _changes(array, before, turns):
-    """Whether another thread writes a number other than that before so many turns are over."""
+def becomes(array, at, number, turns):
+    """Whether an element is that number before so many turns are over."""
     for _ in range(turns):
-        if _seen(array) != before:
+        if seen(array, at) == number:
             return True
         _pause()
     return False
 
 
+@inlined
+def wait_until(array, at, number):
+    """Until an element is that number: another thread is about to write it."""
+    while seen(array, at) != number:
+        _pause()
+
+
+@inlined
+def wait_for_another(array, at, number):
+    """Until an element is another one than that; returns what it is."""
+    while seen(array, at) == number:
+        _pause()
+    return seen(array, at)
+
+
+@inlined
+def offer(board, seats, work, arguments):
+    """Let so many of those who linger do work(*arguments, seat), seats being counted from 1."""
+    if seats > 0:
+        _write_work(board, work, arguments)
+        show(board, _BUSY, seats)
+        show(board, _SEATS, seats)
+        show(board, _ASKED, 0)
+
+
+@inlined
+def _help(board):
+    """Claim a seat and do the work, if there is one; returns whether there was."""
+    seat = seen(board, _SEATS)
+    if seat <= 0 or not _replace(board, _SEATS, seat, seat - 1):
+        return False
+    _do_work(board, seat)
+    add(board, _BUSY, -1)
+    return True
+
+
 @borrowing("void(int64[::1], int64[::1], int64)")
-def linger(ended, bell, turns):
-    """Say that something has ended, and wait until the bell rings, so many turns at most."""
-    before = _seen(bell)
-    _show(ended, 1)
-    _changes(bell, before, turns)
+def linger(ended, board, turns):
+    """Say that something has ended, then help until the bell rings, or until nobody wants help for so many turns."""
+    before, turn = seen(board, _BELL), 0
+    show(ended, 0, 1)
+    while turn < turns and seen(board, _BELL) == before:
+        if _help(board):
+            turn = 0
+        _pause()
+        turn += 1
+
+
+@borrowing("boolean(int64[::1], int64)")
+def are_gone(board, turns):
+    """Withdraw the seats that nobody has claimed; whether those who have end before so many turns are over."""
+    open_seats = seen(board, _SEATS)
+    while not _replace(board, _SEATS, open_seats, 0):
+        open_seats = seen(board, _SEATS)
+    add(board, _BUSY, -open_seats)
+    return becomes(board, _BUSY, 0, turns)
 
 
 @borrowing("boolean(int64[::1], int64)")
 def has_ended(ended, turns):
     """Whether something has ended before so many turns are over."""
-    return _changes(ended, 0, turns)
-
-
-@borrowing
-def ring(bell):
-    """Call those who linger: whoever does that in a kernel has let go of the interpreter, which they need next."""
-    take_number(bell, _FIRST)
+    return becomes(ended, 0, 1, turns)

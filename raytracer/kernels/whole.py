@@ -3,6 +3,7 @@
 import numpy as np
 
 from raytracer.kernels.compiler import borrowing
+from raytracer.kernels.desks import desk_of
 from raytracer.kernels.lanes import WIDTH, is_hit, load, spread
 from raytracer.kernels.strips import start_of
 from raytracer.kernels.tiles import put_lanes
@@ -40,8 +41,9 @@ def range_of(t, index):
 
 
 @borrowing
-def paint_depth(t, index, near, far, first, last, width, scratch, paints, out):
+def paint_depth(t, index, near, far, first, last, width, desks, worker, paints, out):
     """`stages.depth` of rows first to last − 1. The arrays have eight elements to spare."""
+    scratch = desk_of(desks.memory, worker)
     for row in range(first, last):
         for x in range(0, width, WIDTH):
             p = np.uint64(row * width + x)
@@ -51,7 +53,7 @@ def paint_depth(t, index, near, far, first, last, width, scratch, paints, out):
 
 
 @borrowing
-def paint_edges(t, index, near, far, first, last, width, scratch, paints, out):
+def paint_edges(t, index, near, far, first, last, width, desks, worker, paints, out):
     """`stages.edges` of rows first to last − 1."""
     height, step = (len(index) - WIDTH) // width, np.uint64(width)
     for row in range(first, last):
