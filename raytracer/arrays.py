@@ -128,9 +128,12 @@ class Sides(NamedTuple):
     c_low: np.ndarray
     c_error: np.ndarray  # 0 where c is exactly 0: the origin lies on the sphere
 
-    @classmethod
-    def unknown(cls) -> Sides:
-        return cls(np.empty(0, np.int32), np.empty(0), np.empty(0), np.empty(0))
+    @staticmethod
+    def unknown() -> Sides:
+        return _UNKNOWN
+
+
+_UNKNOWN = Sides(np.empty(0, np.int32), np.empty(0), np.empty(0), np.empty(0))
 
 
 class Seen(NamedTuple):

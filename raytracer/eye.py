@@ -20,7 +20,6 @@ from raytracer.methods import CERTIFIED, Method
 from raytracer.plain import candidates_of, xyz
 from raytracer.scene import Scene
 from raytracer.settle import Bundle, Index, Targets, in_twofold, known_in_integers, polish, settle
-from raytracer.units import scene_units
 from raytracer.usual import balls, usual_rows
 
 # A NaN or an infinity makes a decision uncertain, and the next level takes it.
@@ -158,7 +157,7 @@ def open_eye(scene: Scene, raster: Raster, method: str | Method = CERTIFIED, pat
     `path` traces; by default it is chosen.
     """
     spheres, grid, lens = scene.spheres, eye_grid(raster), make_lens(raster)
-    unit, origin, everything, corners = scene_units(scene)
+    unit, origin, everything, corners = scene.in_units
     everything = everything[: len(spheres)]
     boxes, front = plain.bound(lens, origin, everything)
     in_view = _not_empty(boxes)

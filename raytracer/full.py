@@ -30,7 +30,6 @@ from raytracer.certified import inner
 from raytracer.facets import planes_of
 from raytracer.scene import Materials, Scene
 from raytracer.shading import Four, Three, cosine, highlight, land_on_any, raised_to_whole, towards, unit_of
-from raytracer.units import scene_units
 
 _MOST_BITS = 12  # of a power that is worked out by squaring
 
@@ -88,23 +87,19 @@ class World:
     scene: Scene
     lights: tuple[tuple[Three, Three], ...]  # place as seen from the eye, colour
 
-    @cached_property
-    def _units(self) -> tuple[int, np.ndarray, np.ndarray, np.ndarray]:
-        return scene_units(self.scene)
-
     @property
     def unit(self) -> int:
         """Lengths are counted in 2**unit of the scene's."""
-        return self._units[0]
+        return self.scene.in_units[0]
 
     @cached_property
     def eye(self) -> Three:
-        x, y, z = self._units[1].tolist()
+        x, y, z = self.scene.in_units[1].tolist()
         return x, y, z
 
     @cached_property
     def rows(self) -> np.ndarray:
-        _, eye, balls, corners = self._units
+        _, eye, balls, corners = self.scene.in_units
         return np.concatenate([balls, planes_of(eye, corners)]) if len(corners) else balls
 
     @cached_property
@@ -113,7 +108,7 @@ class World:
 
     @cached_property
     def corners(self) -> np.ndarray:
-        _, eye, _, corners = self._units
+        _, eye, _, corners = self.scene.in_units
         return corners_of(eye, corners)
 
     @cached_property

@@ -16,8 +16,6 @@ A sphere of which z is above 4r in front of the eye, and one of which −z is, b
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 
 from raytracer.arrays import Glance
@@ -28,7 +26,7 @@ _U = 2.0**-24
 _LARGEST = 1 << 22  # pixels across: below, each has a number in single precision
 
 
-@lru_cache(maxsize=8)
+@np.errstate(all="ignore")
 def make_glance(raster: Raster, spread: float) -> Glance:
     """What is to be known of a picture. Not usable for a crooked frame, or where κ is not known (spread 0)."""
     camera, (focus, middle_x, middle_y) = raster.camera, in_pixels(raster)

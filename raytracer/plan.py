@@ -20,7 +20,6 @@ from raytracer.methods import CERTIFIED, Method, row_of
 from raytracer.mirrors import mirror_planes
 from raytracer.scene import Light, Scene
 from raytracer.stages import LIGHT_RANGE, STAGES, Stage
-from raytracer.units import scene_units
 
 _REFLECTIONS = 4  # that follow each other where there are mirrors, about
 _TESTS_FOR_ONE = 8  # tests of rays that start on a shape, many together, in the time of one of an eye ray
@@ -107,7 +106,7 @@ class Plan:
         lengths = [abs(x) for point in points for x in point if x]
         smallest = min(scene.spheres.smallest, scene.triangles.smallest, *lengths, inf)
         largest = max(scene.spheres.largest, scene.triangles.largest, *lengths, 0.0)
-        if unit := scene_units(scene)[0]:
+        if unit := scene.in_units[0]:
             smallest, largest = np.ldexp((smallest, largest), -unit).tolist()
         return bool(smallest > _LEAST and largest < _MOST and _LEAST < eye_grid(self.raster).reach < _MOST)
 
@@ -206,7 +205,7 @@ def _reasons_for_terms(plan: Plan) -> Iterator[str]:
         yield "no specular colour: no highlights"
     if terms.mirrors:
         yield f"k_refl given: reflected rays, at most {MOST_REFLECTIONS} after each other"
-        planes, _ = mirror_planes(scene.triangles, len(scene.spheres.balls), scene_units(scene)[0])
+        planes, _ = mirror_planes(scene.triangles, len(scene.spheres.balls), scene.in_units[0])
         if planes and plan.painter:
             yield f"{_count(planes, 'plane mirror')}: what is seen there is looked up where its image is on the screen"
     else:

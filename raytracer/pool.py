@@ -223,7 +223,7 @@ def alone(kernel: Call, *arguments: object) -> Any:
 def together(threads: int) -> Iterator[Call]:
     """How to call kernels so that this many threads are at work on each: `alone` if others are being helped already.
 
-    Such a kernel takes the board and a number of seats, and offers those with `kernels.waiting.offer`.
+    Such a kernel takes the board and a number of seats, and offers those as `kernels.waiting.offering` says.
     """
     kernels, helpers = _kernels, _helpers() if threads > 1 else None
     if kernels is None or helpers is None or not helpers.free.acquire(blocking=False):

@@ -50,7 +50,6 @@ all that is added to c₀, (c₀ + e) / c₁ is at most the larger of what it is
 
 from __future__ import annotations
 
-from functools import lru_cache
 from math import frexp, hypot
 
 import numpy as np
@@ -116,7 +115,6 @@ def _parts_of(focus: float, widest: float) -> int:
     return int(2 ** max(0, 31 - bits))
 
 
-@lru_cache(maxsize=8)
 def make_quick(
     raster: Raster, lights: tuple[Light, ...], unit: int, diffuse: tuple[float, float], background: Colour, flat: Colour
 ) -> Quick:

@@ -150,9 +150,9 @@ def share_pieces(bands: list[slice], watch: Watch, work: Callable[[slice, int], 
 
 def _paint(easel: Easel, watch: Watch) -> None:
     """A stage that a kernel paints; numpy paints the pixels that kernels were not certain of."""
-    screen, shading = easel.screen, easel.plan.shading
-    bands = screen.bands(shading, joint=True)
-    with together(screen.workers(shading)) as call:
+    screen, moments = easel.screen, easel.screen.moments(easel.plan.shading)
+    bands = screen.pieces(moments)
+    with together(screen.workers(moments)) as call:
         for rows in bands:
             watch.check()
             easel.paint(screen.tiles_of(rows), call=call)
@@ -199,6 +199,7 @@ def paints_of(plan: Plan, screen: Screen) -> Paints | FullPaints:
     return make_full_paints(plan, screen) if plan.stage.throws_on else make_paints(plan, screen)
 
 
+@np.errstate(all="ignore")
 def _paint_whole(plan: Plan, screen: Screen, canvas: Canvas, watch: Watch) -> None:
     """A stage that a kernel paints from the hits of the whole picture."""
     paints, hits = make_paints(plan, screen), screen.room_for_hits()

@@ -16,6 +16,7 @@ import numpy as np
 
 from raytracer.arrays import aligned
 from raytracer.notebook import counted, scene_as_html
+from raytracer.units import unit_of
 
 Vector = tuple[float, float, float]
 Colour = tuple[float, float, float]
@@ -276,6 +277,17 @@ class Scene:
 
     def _repr_html_(self) -> str:
         return scene_as_html(self)
+
+    @cached_property
+    def in_units(self) -> tuple[int, np.ndarray, np.ndarray, np.ndarray]:
+        """`units.in_units`: e, the eye (3,), the spheres' `balls`, the triangles' corners (n, 3, 3)."""
+        eye, spheres, triangles = self.camera.eye, self.spheres, self.triangles
+        largest = max(spheres.largest, triangles.largest, *map(abs, eye))
+        unit, lengths = unit_of(largest, np.array(eye), spheres.balls, triangles.vertices)
+        origin, balls, corners = lengths
+        for array in (balls, corners):
+            array.flags.writeable = False  # to the kernels, arrays that can be written to are others
+        return unit, origin, balls, corners
 
     @cached_property
     def numbered(self) -> tuple[np.ndarray, np.ndarray]:

@@ -64,7 +64,6 @@ from raytracer.scene import Camera, Colour, Light, Materials, Scene, Triangles
 from raytracer.settle import Bundle, Index, Targets, known_in_integers, polish, settled
 from raytracer.shading import to_byte
 from raytracer.stages import light_from_eye
-from raytracer.units import scene_units
 
 SPARE = 8  # elements at the end of arrays that are read eight at a time
 _SPARE_RECORDS = 1 << 10  # beyond those of spheres that reach into one or two tiles
@@ -109,13 +108,14 @@ class Workspace:
 _idle: list[Workspace] = []  # threads may take and put them at any time, as that is one step to a list
 
 
-@contextmanager
-def _workspace() -> Iterator[Workspace]:
+def _take_workspace() -> Workspace:
     try:
-        workspace = _idle.pop()
+        return _idle.pop()
     except IndexError:
-        workspace = Workspace()
-    yield workspace
+        return Workspace()
+
+
+def _put_back(workspace: Workspace) -> None:
     if workspace.nbytes < _KEPT and len(_idle) < _WORKSPACES:
         _idle.append(workspace)
 
@@ -126,7 +126,6 @@ class Screen(NamedTuple):
     raster: Raster
     unit: int  # lengths below are counted in 2**unit of the scene's
     origin: np.ndarray  # (3,)
-    spheres: int
     order: np.ndarray | None  # int32, the shapes' places in the file by their numbers; None if that is the same
     view: View
     slow: Slow
@@ -137,27 +136,31 @@ class Screen(NamedTuple):
     threads: int
     desks: Desks  # at least one a thread
 
-    def bands(self, shading: float = 0.0, joint: bool = False) -> list[slice]:
-        """The picture's rows, cut between tiles into pieces that take a moment.
+    def bands(self, shading: float = 0.0) -> list[slice]:
+        """The picture's rows, cut into pieces that take a moment, some for each core, so that all end at one time."""
+        pieces = max(4 * cores(), int(self.moments(shading)))
+        return self._cut(min(self._rows // pieces, _BAND_PIXELS // (self.kernels.TILE_HEIGHT * self.raster.width)))
 
-        Some for each core, so that all are done at one time, but where `joint`: all are at work on the same piece, and
-        wait for the interpreter when it is done, so that it takes some moments.
-        """
-        height, moments = self.kernels.TILE_HEIGHT, self._moments(shading)
-        rows = -(-self.raster.height // height)
-        if joint:
-            step = rows // max(1, int(moments / _MOMENTS_A_PIECE))
-        else:
-            step = min(rows // max(4 * cores(), int(moments)), _BAND_PIXELS // (height * self.raster.width))
-        step = max(1, step)
-        cuts = [row * height for row in range(0, rows, step)]
-        return [slice(a, b) for a, b in zip(cuts, [*cuts[1:], self.raster.height], strict=True)]
+    def pieces(self, moments: float) -> list[slice]:
+        """The same where all are at work on the same piece, which takes some moments: they wait for the slowest."""
+        return self._cut(self._rows // max(1, int(moments / _MOMENTS_A_PIECE)))
 
-    def workers(self, shading: float = 0.0) -> int:
+    @property
+    def _rows(self) -> int:
+        """Of tiles."""
+        return len(self.bins.middles) // self.bins.columns
+
+    def _cut(self, rows: int) -> list[slice]:
+        """The picture's rows, in pieces of so many rows of tiles, at least one."""
+        height = self.raster.height
+        starts = range(0, height, max(1, rows) * self.kernels.TILE_HEIGHT)
+        return [slice(start, min(start + starts.step, height)) for start in starts]
+
+    def workers(self, moments: float) -> int:
         """How many threads are to paint: to wake another takes longer than to do very little."""
-        return min(self.threads, 1 + int(_WORTH_A_THREAD * self._moments(shading)))
+        return min(self.threads, 1 + int(_WORTH_A_THREAD * moments))
 
-    def _moments(self, shading: float) -> float:
+    def moments(self, shading: float) -> float:
         """How long the picture will take, about, for two cores."""
         pixels = self.raster.height * self.raster.width
         moments = (1 + len(self.slow.ids) + shading / 8) * pixels / _PIXELS_A_MOMENT
@@ -215,6 +218,7 @@ class Screen(NamedTuple):
         x, y, z = fine_rows(self.raster)
         return FineRays(np.concatenate([low, np.zeros(SPARE)]), *x, *y, *z)
 
+    @_NOT_A_NUMBER_IS_NO_ERROR
     def in_scene(self, hits: Hits) -> Hits:
         """t in the scene's unit of length, and places in the file in place of numbers of spheres."""
         t = np.ldexp(hits.t, self.unit) if self.unit else hits.t
@@ -293,55 +297,56 @@ class Pixels(NamedTuple):
 @contextmanager
 def open_screen(scene: Scene, raster: Raster, kernels: ModuleType, threads: int | None = None) -> Iterator[Screen]:
     """Sort the scene's spheres into the tiles of the screen. It holds until the context ends."""
-    with _workspace() as workspace, np.errstate(all="ignore"):
-        unit, origin, balls, corners = scene_units(scene)
-        order, material = scene.numbered
-        lens = make_lens(raster)
-        view, boxes = _view(raster, origin, balls, material), _NO_BOXES
-        if len(corners):
-            view, boxes = _with_facets(view, workspace, kernels, lens, raster, origin, corners, scene.triangles)
-        glance = make_glance(raster, view.kappa)
-        workers = threads or cores()
-        bins, slow_ids = _sort(workspace, kernels, lens, glance, view, len(scene.spheres), boxes, workers)
-        slow, targets = _slow(lens, view, origin, balls, slow_ids, kernels)
-        targets = targets._replace(corners=corners, order=order)
-        desks = _desks(workspace, kernels, workers)
-        places = order if len(corners) and len(balls) else None
-        size = len(scene.spheres)
-        yield Screen(raster, unit, origin, size, places, view, slow, bins, boxes, targets, workspace, workers, desks)
+    workspace, threads = _take_workspace(), threads or cores()
+    unit, origin, balls, corners = scene.in_units
+    order, material = scene.numbered
+    sight = _sight(raster)
+    view, boxes = _view(sight, origin, balls, material), _NO_BOXES
+    if len(corners):
+        view, boxes = _with_facets(view, workspace, kernels, sight.lens, raster, origin, corners, scene.triangles)
+    bins, slow_ids = _sort(workspace, kernels, sight, view, len(scene.spheres), boxes, threads)
+    slow, sides = _slow(sight.lens, view, origin, balls, slow_ids) if len(slow_ids) else (_NONE_SLOW, Sides.unknown())
+    targets, desks = Targets(balls, sides, kernels, corners, order), _desks(workspace, kernels, threads)
+    places = order if len(corners) and len(balls) else None
+    yield Screen(raster, unit, origin, places, view, slow, bins, boxes, targets, workspace, threads, desks)
+    _put_back(workspace)
 
 
-@lru_cache(maxsize=64)
+def make_paints(plan: Plan, screen: Screen) -> Paints:
+    """What the plan's stage is painted with."""
+    scene, (flat, background) = plan.scene, plan.stage.flat(plan.scene)
+    colours = scene.materials.diffuse.reshape(-1)
+    paints = _make_paints(plan.raster, plan.lights, screen.unit, scene.materials.diffuse_range, background, flat)
+    return Paints(*paints, colours)
+
+
+@lru_cache(maxsize=8)
+def _make_paints(
+    raster: Raster, lights: tuple[Light, ...], unit: int, diffuse: tuple[float, float], background: Colour, flat: Colour
+) -> tuple[Quick, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """All but the colours."""
+    behind, ahead = _bytes_of(background), _bytes_of(flat)
+    quick = make_quick(raster, lights, unit, diffuse, tuple(behind.tolist()), tuple(ahead.tolist()))
+    return quick, behind, _backdrop(background), ahead, _lights_from_eye(lights, raster.camera, unit)
+
+
 def _bytes_of(colour: Colour) -> np.ndarray:
     """A colour from 0 to 255, to be cut off to whole numbers: float64 (3,)."""
     return np.asarray(to_byte(np.array(colour)))
 
 
-@lru_cache(maxsize=64)
 def _backdrop(colour: Colour) -> np.ndarray:
     """See `Paints.backdrop`."""
     return np.full(16, packed(tuple(_bytes_of(colour).tolist())), np.int32)
 
 
-def make_paints(plan: Plan, screen: Screen) -> Paints:
-    """What the plan's stage is painted with."""
-    flat, background = plan.stage.flat(plan.scene)
-    lights = _lights_from_eye(plan.lights, plan.scene.camera, screen.unit)
-    diffuse = plan.scene.materials.diffuse
-    colours = _bytes_of(background), _bytes_of(flat)
-    quick = make_quick(
-        plan.raster, plan.lights, screen.unit, plan.scene.materials.diffuse_range, *(tuple(c.tolist()) for c in colours)
-    )
-    return Paints(quick, colours[0], _backdrop(background), colours[1], lights, diffuse.reshape(-1))
-
-
-@lru_cache(maxsize=8)
 def _lights_from_eye(lights: tuple[Light, ...], camera: Camera, unit: int) -> np.ndarray:
     """See `Paints.lights`."""
     rows = [(*light_from_eye(light, camera, unit), *light.colour) for light in lights]
     return np.array(rows, np.float64).reshape(-1, 6)
 
 
+@_NOT_A_NUMBER_IS_NO_ERROR
 def make_full_paints(plan: Plan, screen: Screen) -> FullPaints:
     """What the stage `full` is painted with."""
     scene, shapes = plan.scene, (plan.scene.spheres, plan.scene.triangles)
@@ -408,18 +413,24 @@ def _desks(workspace: Workspace, kernels: ModuleType, workers: int) -> Desks:
     return desks
 
 
-def _view(raster: Raster, origin: np.ndarray, balls: np.ndarray, material: np.ndarray) -> View:
-    x, y, z = origin.tolist()
-    return View(
-        *_rays(raster), usable_spread(raster), (x, y, z), balls.reshape(-1), material, _NO_SPHERES, _NO_SPHERES,
-        len(balls),
-    )  # fmt: skip
+class _Sight(NamedTuple):
+    """What the camera and the picture's size alone decide."""
+
+    lens: Lens
+    glance: Glance
+    rays: Grid  # with columns and rows to spare
+    kappa: float  # see `plain.see`
 
 
 @lru_cache(maxsize=8)
-def _rays(raster: Raster) -> Grid:
-    """`eye_grid` with columns and rows to spare."""
-    return grid_of(raster, *_spare_columns_and_rows(raster.of_any_camera))
+def _sight(raster: Raster) -> _Sight:
+    kappa, rays = usable_spread(raster), grid_of(raster, *_spare_columns_and_rows(raster.of_any_camera))
+    return _Sight(make_lens(raster), make_glance(raster, kappa), rays, kappa)
+
+
+def _view(sight: _Sight, origin: np.ndarray, balls: np.ndarray, material: np.ndarray) -> View:
+    x, y, z = origin.tolist()
+    return View(*sight.rays, sight.kappa, (x, y, z), balls.reshape(-1), material, _NO_SPHERES, _NO_SPHERES, len(balls))
 
 
 @lru_cache(maxsize=8)
@@ -455,8 +466,7 @@ def _with_facets(
 def _sort(
     workspace: Workspace,
     kernels: ModuleType,
-    lens: Lens,
-    glance: Glance,
+    sight: _Sight,
     view: View,
     spheres: int,
     facet_boxes: np.ndarray,
@@ -471,7 +481,7 @@ def _sort(
         workspace.sorting = key, *_piles(workspace, *key)
     _, piles, bins = workspace.sorting
     with together(parts) as call:
-        while not call(kernels.sort, glance, lens, view, facet_boxes.reshape(-1), piles, bins):
+        while not call(kernels.sort, sight.glance, sight.lens, view, facet_boxes.reshape(-1), piles, bins):
             workspace.sorting = key, *_piles(workspace, *key, (piles.found[:, 0] + kernels.SIXTEEN).tolist())
             _, piles, bins = workspace.sorting
     slow = zip(piles.cuts, piles.found[:parts, 1].tolist(), strict=False)
@@ -501,14 +511,11 @@ def _piles(
     return piles, Bins(starts, array(rooms[-1] + _SPARE, np.uint64, "entries"), middles, columns)
 
 
-def _slow(
-    lens: Lens, view: View, origin: np.ndarray, balls: np.ndarray, ids: np.ndarray, kernels: ModuleType
-) -> tuple[Slow, Targets]:
-    """What has to be known of the slow spheres; and all spheres as the levels above float64 want them."""
-    if not len(ids):
-        return _NONE_SLOW, Targets(balls, Sides.unknown(), kernels)
+@_NOT_A_NUMBER_IS_NO_ERROR
+def _slow(lens: Lens, view: View, origin: np.ndarray, balls: np.ndarray, ids: np.ndarray) -> tuple[Slow, Sides]:
+    """What has to be known of the slow spheres."""
     some = balls[ids]
     boxes, front = plain.bound(lens, origin, some)
     seen = plain.see(view, view.kappa, origin, some, front)
     seen, sides = known_in_integers(origin, some, seen)
-    return Slow(ids, boxes, seen), Targets(balls, sides._replace(which=ids[sides.which]), kernels)
+    return Slow(ids, boxes, seen), sides._replace(which=ids[sides.which])

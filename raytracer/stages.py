@@ -19,7 +19,6 @@ from raytracer.facets import planes_of
 from raytracer.full import World
 from raytracer.image import to_bytes
 from raytracer.scene import Camera, Colour, Light, Scene, Vector
-from raytracer.units import scene_units
 
 DUMMY = (0.8, 0.2, 0.3)
 BLACK, WHITE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
@@ -87,16 +86,12 @@ class Block:
     @cached_property
     def _unit(self) -> int:
         """Lengths are counted in 2**unit where their squares would be beyond float64."""
-        return self._units[0]
-
-    @cached_property
-    def _units(self) -> tuple[int, np.ndarray, np.ndarray, np.ndarray]:
-        return scene_units(self.scene)
+        return self.scene.in_units[0]
 
     @cached_property
     def _rows(self) -> np.ndarray:
         """What is hit, in units: a sphere's centre and radius, or a triangle's plane: (hits, 4)."""
-        _, eye, balls, corners = self._units
+        _, eye, balls, corners = self.scene.in_units
         if not self._flat.any():
             hit_balls: np.ndarray = balls[self._number]
             return hit_balls
@@ -135,7 +130,7 @@ class Block:
         """P, from the eye to the hit points, and r·N, and r, in units: arrays (hits,)."""
         x, y, z = (component[self.hit] for component in self._directions)
         a, b, c, d = self._rows.T
-        ex, ey, ez = self._units[1]
+        ex, ey, ez = self.scene.in_units[1]
         return shading.land_on_any(self._t, (x, y, z), (ex, ey, ez), (a, b, c, d), self._flat)
 
     @property

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from raytracer.scene import Scene
-
 _TOO_SMALL, _TOO_LARGE = 1e-50, 1e50
 
 
@@ -15,18 +13,12 @@ def in_units(*lengths: np.ndarray) -> tuple[int, list[np.ndarray]]:
     The lengths stay as they are, e = 0, if some of them would lose digits.
     """
     largest = max((float(np.abs(array).max(initial=0.0)) for array in lengths), default=0.0)
+    return unit_of(largest, *lengths)
+
+
+def unit_of(largest: float, *lengths: np.ndarray) -> tuple[int, list[np.ndarray]]:
+    """The same where the largest is known."""
     return (0, list(lengths)) if _is_usual(largest) else _scaled(largest, *lengths)
-
-
-def scene_units(scene: Scene) -> tuple[int, np.ndarray, np.ndarray, np.ndarray]:
-    """`in_units` for a scene: e, the eye (3,), the spheres' `balls`, the triangles' corners (n, 3, 3)."""
-    eye, spheres, triangles = scene.camera.eye, scene.spheres, scene.triangles
-    origin, largest = np.array(eye), max(spheres.largest, triangles.largest, *map(abs, eye))
-    if _is_usual(largest):
-        return 0, origin, spheres.balls, triangles.vertices
-    unit, (origin, balls, corners) = _scaled(largest, origin, spheres.balls, triangles.vertices)
-    balls.flags.writeable = corners.flags.writeable = False  # to the kernels, arrays that can be written to are others
-    return unit, origin, balls, corners
 
 
 def _is_usual(largest: float) -> bool:

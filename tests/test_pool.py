@@ -111,22 +111,24 @@ def test_helpers_that_linger_help_again():
 
 if KERNELS is not plain:
     from raytracer.kernels.compiler import borrowing
-    from raytracer.kernels.waiting import add, becomes, offer
+    from raytracer.kernels.waiting import add, becomes, offering
 
     @borrowing
     def _arrive(seats_taken, here, expected, seat):
         """Say that this seat is taken, and wait a while until so many threads have said so."""
         seats_taken[seat] += 1
         add(here, 0, 1)
-        return becomes(here, 0, expected, 1 << 24)
+        return becomes(here, 0, expected, 1 << 26)
+
+    _offer = offering(_arrive)
 
     @borrowing
-    def offer_and_go(board, seats_taken, here):
-        offer(board, 1, _arrive, (seats_taken, here, 2))
+    def _offer_one_seat(board, seats_taken, here):
+        _offer(board, 1, (seats_taken, here, 2))
 
     @borrowing
     def _meet(board, seats, seats_taken, here, expected):
-        offer(board, seats, _arrive, (seats_taken, here, expected))
+        _offer(board, seats, (seats_taken, here, expected))
         return _arrive(seats_taken, here, expected, 0)
 
 
@@ -160,16 +162,20 @@ def test_seats_that_nobody_has_claimed_are_withdrawn():
 @compiled
 def test_who_has_claimed_a_seat_is_waited_for():
     board, taken, here = np.zeros(BOARD, np.int64), np.zeros(2, np.int64), np.zeros(1, np.int64)
-    thread = threading.Thread(target=KERNELS.linger, args=(np.zeros(1, np.int64), board, 1 << 20), daemon=True)
+    _offer_one_seat(board, taken, here)
+    thread = threading.Thread(target=KERNELS.linger, args=(np.zeros(1, np.int64), board, 1 << 40), daemon=True)
     thread.start()
-    offer_and_go(board, taken, here)
-    while not taken[1]:
+    for _ in range(5000):
         time.sleep(0.001)
+        if taken[1]:
+            break
+    assert taken.tolist() == [0, 1]
     assert not KERNELS.are_gone(board, 1000)
     here[0] = 2
-    assert KERNELS.are_gone(board, 1 << 40)
+    assert KERNELS.are_gone(board, 1 << 24)
     board[0] += 1
     thread.join(5)
+    assert not thread.is_alive()
 
 
 @compiled

@@ -335,7 +335,7 @@ def painted(plan: Plan, room: int = 40_000):
 
 def test_there_is_room_for_the_doubts_of_a_tile_and_of_all_that_was_put_off():
     done, left, listed, _ = painted(make_plan(full_tiles(), "diffuse", 128, 224, path=KERNELS))
-    assert not done
+    assert done
     assert not left
     assert 5 * 4000 < listed < 32_768
 

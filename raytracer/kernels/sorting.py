@@ -13,7 +13,7 @@ from raytracer.arrays import APART, Records
 from raytracer.kernels.bounds import bound, record_boxes
 from raytracer.kernels.compiler import borrowing, inlined
 from raytracer.kernels.lanes import SIXTEEN, fetch_to_write
-from raytracer.kernels.waiting import add, offer, show, wait_for_another, wait_until
+from raytracer.kernels.waiting import add, offering, show, wait_for_another, wait_until
 
 _TAKEN, _COUNTED, _STATE, _FILLED = (APART * place for place in range(4))
 _COUNTING, _FITS, _TOO_MANY = range(3)
@@ -21,20 +21,8 @@ _SPARE = 32  # list entries beyond the last that a kernel may look at
 
 
 @borrowing
-def sort(board, seats, near, lens, view, facet_boxes, piles, bins):
-    """Sort shapes into the lists of tiles; others may help: see `offer`. Spheres that are slow are in none.
-
-    Returns whether there was room for all records, and SIXTEEN more of each part; piles.found tells how many there are.
-    """
-    for place in range(_FILLED + 1):
-        piles.progress[place] = 0
-    offer(board, seats, _sort_parts, (near, lens, view, facet_boxes, piles, bins))
-    return _sort_parts(near, lens, view, facet_boxes, piles, bins, 0)
-
-
-@borrowing
 def _sort_parts(near, lens, view, facet_boxes, piles, bins, worker):
-    """What each thread does for that."""
+    """What each thread does to sort."""
     parts, progress = len(piles.found), piles.progress
     part = add(progress, _TAKEN, 1)
     while part < parts:
@@ -53,6 +41,21 @@ def _sort_parts(near, lens, view, facet_boxes, piles, bins, worker):
         _fill(_records_of(piles, part), piles.found[part, 0], piles.counts[part], bins.entries)
         part = add(progress, _FILLED, 1)
     return fits
+
+
+_offer = offering(_sort_parts)
+
+
+@borrowing
+def sort(board, seats, near, lens, view, facet_boxes, piles, bins):
+    """Sort shapes into the lists of tiles; others may help: see `offering`. Spheres that are slow are in none.
+
+    Returns whether there was room for all records, and SIXTEEN more of each part; piles.found tells how many there are.
+    """
+    for place in range(_FILLED + 1):
+        piles.progress[place] = 0
+    _offer(board, seats, (near, lens, view, facet_boxes, piles, bins))
+    return _sort_parts(near, lens, view, facet_boxes, piles, bins, 0)
 
 
 @inlined

@@ -43,7 +43,7 @@ from raytracer.kernels.quick import (
 from raytracer.kernels.strips import fetch_row, put_pixel, start_of
 from raytracer.kernels.surfaces import ball_of, diffuse_of_any, diffuse_of_spheres, line_of, normal, ray_of
 from raytracer.kernels.visibility import STRIDE, list_doubts, see_tile, see_tile_unchecked
-from raytracer.kernels.waiting import offer
+from raytracer.kernels.waiting import offering
 from raytracer.shading import to_byte
 from raytracer.twofold import select
 
@@ -53,11 +53,11 @@ ROOM = 3 * TILE_WIDTH * TILE_HEIGHT + FEW_LATE
 
 
 def _paint(board, seats, view, slow, bins, tiles, desks, worker, paints, out):
-    """Paint tiles, as long as there are any and there is room for doubts; others may help: see `offer`.
+    """Paint tiles, as long as there are any and there is room for doubts; others may help: see `offering`.
 
     Returns whether the caller still has room, so that all tiles are done, or taken.
     """
-    offer(board, seats, work, (view, slow, bins, tiles, desks, paints, out))
+    offer(board, seats, (view, slow, bins, tiles, desks, paints, out))
     return work(view, slow, bins, tiles, desks, paints, out, worker)
 
 
@@ -270,7 +270,7 @@ def _painter(
         _work, f"{name}_work", paint_tile=paint_tile, fill_tile=fill_tile, see=see, paint_quickly=paint_quickly,
         finish=finish, decide=decide,
     )  # fmt: skip
-    return variant(_paint, name, work=work)
+    return variant(_paint, name, work=work, offer=offering(work))
 
 
 paint_flat = _painter("paint_flat", _flat_tile, paint_quickly=flat_quickly, decide=decide_flat)

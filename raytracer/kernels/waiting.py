@@ -16,7 +16,7 @@ from numba.core.cgutils import get_or_insert_function
 from numba.extending import intrinsic
 
 from raytracer.arrays import APART, BOARD
-from raytracer.kernels.compiler import borrowing, inlined
+from raytracer.kernels.compiler import borrowing, inlined, variant
 from raytracer.kernels.lanes import PROCESSOR
 
 _ALIGNED = 8
@@ -90,33 +90,51 @@ def _pause(typing):
 _BY_ADDRESS = types.voidptr, types.int64  # what a function is given that is called so: where arguments are, and a seat
 
 
-@intrinsic
-def _write_work(typing, board, work, arguments):
-    """Write on the board what is to be done: work(*arguments, seat)."""
-    signature = work.get_call_type(typing, (*arguments.types, types.int64), {})
+def offering(work):
+    """A part of kernels: `offer(board, seats, arguments)` lets so many of those who linger do work(*arguments, seat).
 
-    def lower(context, builder, sig, args):
-        value, (board, _, arguments) = context.get_value_type(sig.args[2]), args
-        if (size := context.get_abi_sizeof(value)) > 8 * (BOARD - _ARGUMENTS):
-            raise ValueError(f"found {size} bytes of arguments, expected {8 * (BOARD - _ARGUMENTS)} at most")
-        kind = context.call_conv.get_function_type(types.none, _BY_ADDRESS)
-        function = ir.Function(builder.module, kind, f"{builder.function.name}.by_a_helper")
-        function.linkage = "internal"
-        inner = ir.IRBuilder(function.append_basic_block())
-        where, seat = context.call_conv.get_arguments(function)
-        given = inner.load(inner.bitcast(where, value.as_pointer()), align=_ALIGNED)
-        each = [inner.extract_value(given, k) for k in range(len(signature.args) - 1)]
-        context.get_function(work, signature)(inner, (*each, seat))
-        context.call_conv.return_value(inner, context.get_dummy_value())
+    Seats are counted from 1. `work` is a kernel, and borrows what it is given.
+    """
 
-        def place(k):
-            return _place(context, builder, sig.args[0], board, ir.Constant(_WORD, k))
+    @intrinsic
+    def write_work(typing, board, arguments):
+        kind = typing.resolve_value_type(work)
+        signature = kind.get_call_type(typing, (*arguments.types, types.int64), {})
 
-        builder.store(builder.ptrtoint(function, _WORD), place(_WORK))
-        builder.store(arguments, builder.bitcast(place(_ARGUMENTS), value.as_pointer()), align=_ALIGNED)
-        return context.get_dummy_value()
+        def lower(context, builder, sig, args):
+            _write(context, builder, sig.args, args, context.get_function(kind, signature))
+            return context.get_dummy_value()
 
-    return types.void(board, work, arguments), lower
+        return types.void(board, arguments), lower
+
+    return variant(_offer, f"offer_{work.__name__}", inlined, write_work=write_work)
+
+
+def _offer(board, seats, arguments):
+    if seats > 0:
+        write_work(board, arguments)
+        show(board, _BUSY, seats)
+        show(board, _SEATS, seats)
+        show(board, _ASKED, 0)
+
+
+def _write(context, builder, kinds, values, call):
+    """Write on the board what is to be called by its address, and with what."""
+    (board_kind, kind), (board, arguments), conv = kinds, values, context.call_conv
+    value = context.get_value_type(kind)
+    if (size := context.get_abi_sizeof(value)) > 8 * (BOARD - _ARGUMENTS):
+        raise ValueError(f"found {size} bytes of arguments, expected {8 * (BOARD - _ARGUMENTS)} at most")
+    function_type = conv.get_function_type(types.none, _BY_ADDRESS)
+    function = ir.Function(builder.module, function_type, f"{builder.function.name}.by_a_helper")
+    function.linkage = "internal"
+    inner = ir.IRBuilder(function.append_basic_block())
+    where, seat = conv.get_arguments(function)
+    given = inner.load(inner.bitcast(where, value.as_pointer()), align=_ALIGNED)
+    call(inner, (*(inner.extract_value(given, k) for k in range(len(kind.types))), seat))
+    conv.return_value(inner, context.get_dummy_value())
+    address, room = (_place(context, builder, board_kind, board, ir.Constant(_WORD, at)) for at in (_WORK, _ARGUMENTS))
+    builder.store(builder.ptrtoint(function, _WORD), address)
+    builder.store(arguments, builder.bitcast(room, value.as_pointer()), align=_ALIGNED)
 
 
 @intrinsic
@@ -161,16 +179,6 @@ def wait_for_another(array, at, number):
     while seen(array, at) == number:
         _pause()
     return seen(array, at)
-
-
-@inlined
-def offer(board, seats, work, arguments):
-    """Let so many of those who linger do work(*arguments, seat), seats being counted from 1."""
-    if seats > 0:
-        _write_work(board, work, arguments)
-        show(board, _BUSY, seats)
-        show(board, _SEATS, seats)
-        show(board, _ASKED, 0)
 
 
 @inlined
