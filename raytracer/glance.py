@@ -26,7 +26,6 @@ _U = 2.0**-24
 _LARGEST = 1 << 22  # pixels across: below, each has a number in single precision
 
 
-@np.errstate(all="ignore")
 def make_glance(raster: Raster, spread: float) -> Glance:
     """What is to be known of a picture. Not usable for a crooked frame, or where κ is not known (spread 0)."""
     camera, (focus, middle_x, middle_y) = raster.camera, in_pixels(raster)

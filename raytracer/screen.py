@@ -423,6 +423,7 @@ class _Sight(NamedTuple):
 
 
 @lru_cache(maxsize=8)
+@_NOT_A_NUMBER_IS_NO_ERROR
 def _sight(raster: Raster) -> _Sight:
     kappa, rays = usable_spread(raster), grid_of(raster, *_spare_columns_and_rows(raster.of_any_camera))
     return _Sight(make_lens(raster), make_glance(raster, kappa), rays, kappa)

@@ -10,7 +10,7 @@ import numpy as np
 
 from raytracer.alike import NEAREST_LIGHT, bounds_of, cubic_error, cubic_of, least_error, rim_error
 from raytracer.certified import inner
-from raytracer.kernels.compiler import borrowing, inlined, variant
+from raytracer.kernels.compiler import called, inlined, variant
 from raytracer.kernels.lanes import WIDTH, bits_of, blend, gather, gather_rows, load_low, spread, store_pair
 from raytracer.kernels.rough import inverse, twice_root
 from raytracer.kernels.sixteen import (
@@ -40,7 +40,7 @@ def _put(table, batch, column, lanes):
     store_halves(table, (batch + np.uint64(column)) * _EIGHT, lanes)
 
 
-@borrowing
+@called
 def tabulate(view, bins, first, end, tile, s, paints, numbers):
     """Work out the numbers of all spheres of a list; returns whether there is room, and lights are far enough away."""
     quick, (sigma, tilt) = paints.quick, bounds_of(s)

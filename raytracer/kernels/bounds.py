@@ -15,7 +15,7 @@ import numpy as np
 
 from raytracer.boxes import beside, box_of
 from raytracer.certified import edge_of, side_of
-from raytracer.kernels.compiler import borrowing, inlined
+from raytracer.kernels.compiler import borrowing, called, inlined
 from raytracer.kernels.lanes import (
     SIXTEEN,
     WIDTH,
@@ -174,7 +174,7 @@ def _bound_eight(lens, eye, reach, kappa, balls, i, boxes):
     store_boxes(boxes, np.uint64(0), left, select(quick, box.right, 0.0), box.top, box.bottom)
 
 
-@borrowing
+@called
 def _record(boxes, at, step, shape, columns, records, end):
     """Record a shape, whose box is boxes[at], boxes[at + step], …, in each of its tiles; returns the new end."""
     left, right, top, bottom = boxes[at], boxes[at + step], boxes[at + step + step], boxes[at + step + step + step]
@@ -192,7 +192,7 @@ def _record(boxes, at, step, shape, columns, records, end):
     return end
 
 
-@borrowing
+@called
 def record_boxes(boxes, first, columns, records):
     """Record shapes by their boxes, flat, the first of which has that number; returns as `bound`."""
     end = 0

@@ -14,7 +14,7 @@ import numpy as np
 
 from raytracer.arrays import Tree
 from raytracer.certified import T_TOLERANCE, U, inner, look, meet, nearer, passes
-from raytracer.kernels.compiler import borrowing, compiled, inlined
+from raytracer.kernels.compiler import called, compiled, inlined
 from raytracer.kernels.lanes import WIDTH, bits_of, load, spread, store
 from raytracer.twofold import select
 
@@ -105,7 +105,7 @@ def nearest_in_tree(origins, rays, balls, tree, nearest):
         _nearest(origins, rays, balls, tree, nearest, k, stack, near, times)
 
 
-@borrowing
+@called
 def _nearest(origins, rays, balls, tree, nearest, k, stack, near, times):
     """One ray: the boxes that it may enter before it hits what is known are on the stack, the nearest on top."""
     best, best_error, best_index, unsure = nearest
@@ -143,7 +143,7 @@ def candidates_in_tree(origins, rays, balls, tree):
     return starts, ids
 
 
-@borrowing
+@called
 def _collect(ray, tree, ids, at, stack, near, times):
     """Write what a ray does not certainly miss to `ids` from `at` on, if it has room; returns how many there are."""
     found = 0

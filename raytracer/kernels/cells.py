@@ -18,7 +18,7 @@ import numpy as np
 from raytracer.arrays import CELL_BITS
 from raytracer.boxes import beside, box_of, facet_box
 from raytracer.certified import inner, side_of
-from raytracer.kernels.compiler import borrowing, compiled, inlined
+from raytracer.kernels.compiler import borrowing, called, compiled, inlined
 from raytracer.kernels.lanes import WIDTH, load_rows, spread, store_boxes
 from raytracer.twofold import select
 
@@ -121,7 +121,7 @@ def sort_into_cells(boxes, columns, rows, shift, wider, most):
     return starts, entries
 
 
-@borrowing
+@called
 def _count_entries(boxes, columns, rows, shift, wider, starts):
     """How many entries each cell has, into the element after its own."""
     for screen in range(boxes.shape[0]):
@@ -132,7 +132,7 @@ def _count_entries(boxes, columns, rows, shift, wider, starts):
                     starts[(screen * rows + row) * columns + column + 1] += 1
 
 
-@borrowing
+@called
 def _put_entries(boxes, columns, rows, shift, wider, places, entries):
     """Each entry into the list of its cell; `places` is where each list goes on."""
     for screen in range(boxes.shape[0]):

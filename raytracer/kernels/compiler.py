@@ -67,16 +67,19 @@ for _name in machine_code.SOURCES:
 
 
 _CACHE = machine_code.folder()
-compiled = partial(numba.njit, cache=_CACHE is not None, nogil=True, error_model="numpy")
+compiled = partial(numba.njit, cache=_CACHE is not None, nogil=True, error_model="numpy", no_cfunc_wrapper=True)
 
 # For kernels that make no arrays: without counting who still uses those that they are given.
 borrowing = partial(compiled, _nrt=False)
 
+# For parts of those that Python does not call: without what takes its arguments apart, a quarter of all machine code.
+called = partial(borrowing, no_cpython_wrapper=True)
+
 # For parts of kernels: a call would hand over each array of its arguments in seven pieces.
-inlined = partial(borrowing, forceinline=True)
+inlined = partial(called, forceinline=True)
 
 
-def variant(template: FunctionType, name: str, compile_=borrowing, **names):
+def variant(template: FunctionType, name: str, compile_=called, **names):
     """A kernel made of a function that names some others which are not defined: those given here.
 
     It closes over nothing. Of what closes over a kernel, numba finds no machine code again in another process.

@@ -8,7 +8,7 @@ import numpy as np
 
 from raytracer.camera import fine_ray
 from raytracer.kernels.bounds import TILE_HEIGHT, TILE_WIDTH
-from raytracer.kernels.compiler import borrowing, inlined, variant
+from raytracer.kernels.compiler import called, inlined, variant
 from raytracer.kernels.lanes import WIDTH, load
 from raytracer.kernels.quick import pad_late, put_late, shade_late
 from raytracer.kernels.sixteen import lowest_bit
@@ -42,7 +42,7 @@ def _decide_doubts(view, slow, bins, paints, scratch, doubts, out):
             hits = np.uint64(0)
 
 
-@borrowing
+@called
 def _nearest(view, bins, quick, tile, row, column):
     """What a pixel sees of the spheres of its tile, as `certified.nearer` has it."""
     found = np.inf, 0.0, 0.0, np.int64(-1), False

@@ -27,7 +27,7 @@ from raytracer.bounce import (
 )
 from raytracer.certified import inner
 from raytracer.kernels.cells import spot_of
-from raytracer.kernels.compiler import inlined, variant
+from raytracer.kernels.compiler import borrowing, inlined, variant
 from raytracer.kernels.lanes import (
     WIDTH,
     all_of,
@@ -345,4 +345,4 @@ def _radiance_at(view, paints, d, t, columns, index, scratch):
     return radiance(view, paints, t, d, index, spread(0.0) == 0.0, 0, -1, scratch)
 
 
-radiance_of = variant(colours_of_hits, "radiance_of", colours=_radiance_at)
+radiance_of = variant(colours_of_hits, "radiance_of", borrowing, colours=_radiance_at)

@@ -18,7 +18,7 @@ import numpy as np
 from raytracer.certified import approach, inner
 from raytracer.kernels.alike import shade_alike, shade_alike_unchecked, tabulate
 from raytracer.kernels.bounds import TILE_HEIGHT, TILE_WIDTH
-from raytracer.kernels.compiler import borrowing, inlined, variant
+from raytracer.kernels.compiler import called, inlined, variant
 from raytracer.kernels.desks import MOST
 from raytracer.kernels.lanes import (
     SIXTEEN,
@@ -219,7 +219,7 @@ def _doubt(sheet, p, bits):
         sheet.doubt[p // np.uint64(SIDE) + row] |= bits >> SIDE * row & (1 << SIDE) - 1
 
 
-@borrowing
+@called
 def _decide(view, bins, tile, sheet, doubts):
     """Decide in float64 what single precision could not tell, and list what float64 cannot tell either."""
     width, sheet.doubtful[0] = len(view.across) - WIDTH, 0
@@ -242,7 +242,7 @@ def _decide(view, bins, tile, sheet, doubts):
                         doubts[doubts[0]] = (tile.top + y) * width + tile.left + x
 
 
-@borrowing
+@called
 def _first_of(view, bins, tile, x, y):
     """Which of a tile's list one of its pixels sees, counted from 1; and whether float64 cannot tell."""
     best, number, unsure, balls = np.inf, 0, False, view.balls
@@ -380,7 +380,7 @@ def _light(quick, sheet, x, y, u, v):
     return (red * r, green * g, blue * b), rough * size, off
 
 
-@borrowing
+@called
 def _keep_for_later(bins, tile, count, sheet):
     """List the pixels of a tile that are to be shaded in float64, from so many pairs of blocks."""
     late, last = sheet.late[0], bins.starts[tile.number] - 1
@@ -398,7 +398,7 @@ def _keep_for_later(bins, tile, count, sheet):
     sheet.late[0] = late
 
 
-@borrowing
+@called
 def shade_anew(view, paints, scratch, doubts, out):
     """Shade the pixels that have been listed for that in float64, eight at a time.
 

@@ -8,7 +8,7 @@ whoever called has it read by Python.
 
 import numpy as np
 
-from raytracer.kernels.compiler import borrowing, inlined
+from raytracer.kernels.compiler import borrowing, called, inlined
 from raytracer.twofold import divide, multiply
 
 _MOST_DIGITS, _LARGEST_POWER = 19, 44
@@ -102,7 +102,7 @@ def _numbers(text, p, table, row, count):
     return p if _ends_line(text[p]) else _NOTHING
 
 
-@borrowing
+@called
 def _number(text, p):
     """The number that begins there, and the place behind it."""
     negative = text[p] == _MINUS

@@ -11,7 +11,7 @@ import numpy as np
 
 from raytracer.arrays import APART, Records
 from raytracer.kernels.bounds import bound, record_boxes
-from raytracer.kernels.compiler import borrowing, inlined
+from raytracer.kernels.compiler import borrowing, called, inlined
 from raytracer.kernels.lanes import SIXTEEN, fetch_to_write
 from raytracer.kernels.waiting import add, offering, show, wait_for_another, wait_until
 
@@ -20,7 +20,7 @@ _COUNTING, _FITS, _TOO_MANY = range(3)
 _SPARE = 32  # list entries beyond the last that a kernel may look at
 
 
-@borrowing
+@called
 def _sort_parts(near, lens, view, facet_boxes, piles, bins, worker):
     """What each thread does to sort."""
     parts, progress = len(piles.found), piles.progress
@@ -64,7 +64,7 @@ def _records_of(piles, part):
     return Records(records.tiles[start:end], records.corners[start:end], records.shapes[start:end])
 
 
-@borrowing
+@called
 def _bound_part(near, lens, view, piles, columns, part):
     """Record some of the spheres, and count those records."""
     first, last, records = piles.cuts[part], piles.cuts[part + 1], _records_of(piles, part)
@@ -76,7 +76,7 @@ def _bound_part(near, lens, view, piles, columns, part):
     _count(records, end, piles.counts[part])
 
 
-@borrowing
+@called
 def _record_facets(view, boxes, piles, columns, part):
     """Record the triangles, and count those records."""
     records = _records_of(piles, part)
@@ -85,7 +85,7 @@ def _record_facets(view, boxes, piles, columns, part):
     _count(records, end, piles.counts[part])
 
 
-@borrowing
+@called
 def _count(records, end, counts):
     """How many records each tile has, if there is room for all of them."""
     counts[:] = 0
@@ -99,7 +99,7 @@ def _fit(records, end):
     return end + SIXTEEN <= len(records.tiles)
 
 
-@borrowing
+@called
 def _begin(piles, bins):
     """Where each tile's list begins, and in piles.counts each part of it; returns whether all records are there."""
     counts, total, facets = piles.counts, 0, len(piles.cuts) - 1
@@ -121,7 +121,7 @@ def _begin(piles, bins):
     return True
 
 
-@borrowing
+@called
 def _fill(records, end, places, entries):
     """Put records into the lists of their tiles; `places` is where each list goes on."""
     for k in range(np.uint64(end)):

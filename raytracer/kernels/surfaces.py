@@ -8,7 +8,7 @@
 import numpy as np
 
 from raytracer.certified import approach
-from raytracer.kernels.compiler import inlined, variant
+from raytracer.kernels.compiler import borrowing, inlined, variant
 from raytracer.kernels.desks import desk_of
 from raytracer.kernels.lanes import WIDTH, at_least, first_of, gather, gather_rows, load, same, spread, store
 from raytracer.kernels.visibility import from_eye
@@ -135,4 +135,4 @@ def rays_of(view, rows, columns):
 diffuse_of_spheres = variant(_diffuse, "diffuse_of_spheres", inlined, surface=_surface_of_spheres)
 diffuse_of_any = variant(_diffuse, "diffuse_of_any", inlined, surface=_surface_of_any)
 _diffuse_of_hits = variant(_diffuse, "_diffuse_of_hits", inlined, surface=_surface_of_hits)
-diffuse_of = variant(colours_of_hits, "diffuse_of", colours=diffuse_at)
+diffuse_of = variant(colours_of_hits, "diffuse_of", borrowing, colours=diffuse_at)

@@ -12,7 +12,7 @@ import numpy as np
 from raytracer.arrays import APART, Tile
 from raytracer.certified import fine_direction, refine
 from raytracer.kernels.bounds import TILE_HEIGHT, TILE_WIDTH
-from raytracer.kernels.compiler import borrowing, inlined, variant
+from raytracer.kernels.compiler import borrowing, called, inlined, variant
 from raytracer.kernels.desks import desk_of
 from raytracer.kernels.doubts import decide_diffuse, decide_flat, leave_doubts
 from raytracer.kernels.full import radiance
@@ -90,7 +90,7 @@ def _has_room(doubts):
     return len(doubts) - doubts[0] > ROOM
 
 
-@borrowing
+@called
 def _take(tiles, worker):
     """The number of a tile that nobody has taken, −1 if there is none."""
     runs = len(tiles.taken) // APART
@@ -132,7 +132,7 @@ def _background(paints):
     return spread(paints.background[0]), spread(paints.background[1]), spread(paints.background[2])
 
 
-@borrowing
+@called
 def _fill_tile(scratch, tile, paints, out):
     """The background."""
     step, right = np.uint64(out.pixel_bytes), min(tile.right, out.columns)
@@ -147,7 +147,7 @@ def _fill_tile(scratch, tile, paints, out):
             start += step
 
 
-@borrowing
+@called
 def _flat_tile(view, scratch, tile, paints, out):
     """One colour wherever anything is hit."""
     background, flat = _background(paints), paints.flat
@@ -210,7 +210,7 @@ def _put_hits(out, at, room, t, place, scratch):
             out.index[at + pixel] = scratch.index[place + pixel]
 
 
-@borrowing
+@called
 def _hits_tile(view, scratch, tile, paints, out):
     """t and index as they are in the buffer."""
     for row in range(tile.top, tile.bottom):
@@ -224,7 +224,7 @@ def _hits_tile(view, scratch, tile, paints, out):
             _put_hits(out, at, tile.right - x, t, place, scratch)
 
 
-@borrowing
+@called
 def _fine_hits_tile(view, scratch, tile, fine, out):
     """t to the last digit, and index; where that is not certain, NaN."""
     for row in range(tile.top, tile.bottom):
@@ -248,7 +248,7 @@ def _fine_hits_tile(view, scratch, tile, fine, out):
             _put_hits(out, at, tile.right - x, t, place, scratch)
 
 
-@borrowing
+@called
 def _no_hits_tile(scratch, tile, paints, out):
     for row in range(tile.top, tile.bottom):
         start = (row - out.first_row) * out.width
@@ -270,7 +270,7 @@ def _painter(
         _work, f"{name}_work", paint_tile=paint_tile, fill_tile=fill_tile, see=see, paint_quickly=paint_quickly,
         finish=finish, decide=decide,
     )  # fmt: skip
-    return variant(_paint, name, work=work, offer=offering(work))
+    return variant(_paint, name, borrowing, work=work, offer=offering(work))
 
 
 paint_flat = _painter("paint_flat", _flat_tile, paint_quickly=flat_quickly, decide=decide_flat)

@@ -16,7 +16,7 @@ from raytracer.certified import (
     passes,
     refine,
 )
-from raytracer.kernels.compiler import borrowing, compiled, inlined
+from raytracer.kernels.compiler import called, compiled, inlined
 from raytracer.kernels.lanes import WIDTH, all_of, bits_of, gather_rows, is_hit, load, spread, store
 from raytracer.twofold import select
 
@@ -124,7 +124,7 @@ def nearest_twofold(origins, rays, candidates, balls, sides, nearest):
         best[k], _, best_error[k], best_index[k], unsure[k] = found
 
 
-@borrowing
+@called
 def try_twofold(found, origin, ray, table, i, side):
     """The nearest hit so far, as `nearer` has it, after sphere i; of equal ones it is the first."""
     (best, _, best_error, best_index, _), (ox, oy, oz), (dx, dy, dz, dx_low, dy_low, dz_low, m) = found, origin, ray

@@ -30,7 +30,7 @@ from raytracer.certified import (
     side_of,
 )
 from raytracer.kernels.bounds import TILE_HEIGHT, TILE_WIDTH
-from raytracer.kernels.compiler import borrowing, compiled, inlined, variant
+from raytracer.kernels.compiler import called, compiled, inlined, variant
 from raytracer.kernels.lanes import (
     WIDTH,
     all_of,
@@ -178,7 +178,7 @@ def _keep(scratch, p, wins, k, best, i):
     store(scratch.index, p, blend(wins, spread(i), load(scratch.index, p)))
 
 
-@borrowing
+@called
 def _draw_facet(view, entry, tile, scratch):
     """A triangle in its box. Returns whether there are doubts."""
     i, (start, stop, high, low) = np.int32(sphere_of(entry)), corners_of(entry)
@@ -251,7 +251,7 @@ def _linear(f, at, across, up):
     return across * f[at] + (up * f[at + np.uint64(1)] + f[at + np.uint64(2)])
 
 
-@borrowing
+@called
 def _draw_slow(view, slow, i, tile, scratch):
     """Any sphere in its box."""
     start, stop = max(slow.boxes[i, 0] - tile.left, 0), min(slow.boxes[i, 1] - tile.left, TILE_WIDTH)
@@ -283,7 +283,7 @@ def _note(doubt, p, bits):
             doubt[p + np.uint64(lane)] = True
 
 
-@borrowing
+@called
 def list_doubts(view, tile, scratch, doubts):
     """Add the tile's doubtful pixels, as row · width + column, to a list, whose first element is its length."""
     width = len(view.across) - WIDTH
@@ -315,7 +315,7 @@ def candidates(slow, bins, xs, ys):
     return starts, ids
 
 
-@borrowing
+@called
 def _merge(slow, bins, x, y, ids, at):
     """Write a pixel's candidates, ascending, to `ids` from `at` on, if it has room; returns how many there are."""
     tile, found, slows = y // TILE_HEIGHT * bins.columns + x // TILE_WIDTH, 0, 0
