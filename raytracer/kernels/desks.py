@@ -19,7 +19,7 @@ from raytracer.kernels.lanes import SIXTEEN
 from raytracer.kernels.visibility import STRIDE
 
 MOST = 1 << 12  # spheres of a tile's list; of more, the table would leave the core's caches
-_LINE = 64  # bytes, of the processor's cache: where arrays begin
+_PAGE, _STEP = 4096, 1088  # bytes: each array begins a step further in its page, and where a line of the cache does
 _NUMBERS = 1 << 14  # of spheres of a tile, for the blocks that show but one
 _STACK = 8 * 24  # boxes that may wait, eight a level
 _PIXELS, _BUFFER = TILE_HEIGHT * TILE_WIDTH, (TILE_HEIGHT + 1) * STRIDE
@@ -65,16 +65,20 @@ class _Part(NamedTuple):
 
 
 def _lay_out() -> tuple[dict[type, dict[str, _Part]], int]:
-    """Where the arrays are, and how many bytes a desk has."""
-    end, parts = 0, dict[type, dict[str, _Part]]()
+    """Where the arrays are, and how many bytes a desk has.
+
+    A load waits for an earlier store to the same place of another page, as if that were to the same memory.
+    """
+    start, end, parts = 0, 0, dict[type, dict[str, _Part]]()
     for owner, arrays in _ARRAYS.items():
         parts[owner] = {}
         for name, (kind, count) in arrays.items():
+            end += (start - end) % _PAGE
             parts[owner][name] = _Part(end, kind, count)
-            end += -(-count * np.dtype(kind).itemsize // _LINE) * _LINE
+            start, end = start + _STEP, end + count * np.dtype(kind).itemsize
     depth = parts[QuickScratch]["depth"]
     parts[QuickScratch]["colour"] = depth._replace(kind=np.int32)
-    return parts, end
+    return parts, end + -end % _PAGE
 
 
 _PARTS, DESK = _lay_out()
