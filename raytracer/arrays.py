@@ -342,8 +342,7 @@ class QuickScratch(NamedTuple):
     depth: np.ndarray  # float32 (pixels,), k of the nearest hit so far
     colour: np.ndarray  # int32 (pixels,), red in the lowest byte: in the memory of the depth, once that is done with
     number: np.ndarray  # int32 (pixels,): which of the tile's list that is, counted from 1, 0 for none
-    doubt: np.ndarray  # int32 (rows of strips,), a bit a pixel
-    doubtful: np.ndarray  # int64 (1,): 1 if there is any bit
+    doubt: np.ndarray  # int32 (pixels / 16,): a byte for each row of a strip, and in that a bit a pixel
     table: np.ndarray  # float32, flat: eight numbers for each of the tile's list, for shading; the first row is free
     batch: np.ndarray  # float32, flat: what is computed of eight spheres at once, for drawing
     numbers: np.ndarray  # float32, flat: see `kernels.alike`

@@ -37,8 +37,7 @@ _ARRAYS = {
     QuickScratch: {
         "depth": (np.float32, _PIXELS),
         "number": (np.int32, _PIXELS),
-        "doubt": (np.int32, _PIXELS // 4),
-        "doubtful": (np.int64, 1),
+        "doubt": (np.int32, _PIXELS // 16),
         "table": (np.float32, 8 * (MOST + SIXTEEN)),
         "batch": (np.float32, 160),
         "numbers": (np.float32, _NUMBERS),

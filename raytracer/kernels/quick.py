@@ -50,6 +50,7 @@ from raytracer.kernels.sixteen import (
     load_numbers,
     load_two,
     lowest_bit,
+    mark_block,
     rough_inverse_root,
     rows_of_block,
     sixteen,
@@ -97,9 +98,9 @@ def _paint_tile(view, slow, bins, tile, scratch, doubts, paints, out):
         return False
     fit, extremes = draw_all(view, bins, first, end, tile, paints, sheet)
     if not fit:
-        sheet.doubt[:], sheet.doubtful[0] = 0, 0
+        sheet.doubt[:] = 0
         return False
-    if certain and sheet.doubtful[0]:
+    if certain:
         _decide(view, bins, tile, sheet, doubts)
     colour_all(view, bins, tile, extremes, paints, sheet, out)
     return True
@@ -206,33 +207,26 @@ def _draw(entry, number, j, over_tie, sheet):
             if certain:
                 unsure = smaller_size(disc, (k - best) * by_rim) <= rim  # also where k is not a number
                 if any_of(unsure):
-                    _doubt(sheet, p, bits_of(unsure))
+                    mark_block(sheet.doubt, p // np.uint64(SIDE), bits_of(unsure))
             shift += _STEP
             p += np.uint64(STRIP)
-
-
-@inlined
-def _doubt(sheet, p, bits):
-    """Mark sixteen pixels, by the rows of their strip."""
-    sheet.doubtful[0] = 1
-    for row in range(np.uint64(SIDE)):
-        sheet.doubt[p // np.uint64(SIDE) + row] |= bits >> SIDE * row & (1 << SIDE) - 1
 
 
 @called
 def _decide(view, bins, tile, sheet, doubts):
     """Decide in float64 what single precision could not tell, and list what float64 cannot tell either."""
-    width, sheet.doubtful[0] = len(view.across) - WIDTH, 0
+    width = len(view.across) - WIDTH
     for some in range(np.uint64(0), np.uint64(len(sheet.doubt)), _SIXTEEN):
-        rows = np.int32(bits_of(load_numbers(sheet.doubt, some) > 0))
-        while rows:
-            row = some + np.uint64(lowest_bit(rows))
-            rows &= rows - 1
-            bits = sheet.doubt[row]
-            sheet.doubt[row] = 0
+        fours = np.int32(bits_of(load_numbers(sheet.doubt, some) > 0))
+        while fours:
+            four = some + np.uint64(lowest_bit(fours))
+            fours &= fours - 1
+            bits = sheet.doubt[four]
+            sheet.doubt[four] = 0
             while bits:
-                p = np.int32(row) * SIDE + lowest_bit(bits)
+                bit = lowest_bit(bits)
                 bits &= bits - 1
+                p = (np.int32(four) * 4 + bit // 8) * SIDE + bit % 8
                 x, y = pixel_of(p)
                 if is_in(tile, x, y):
                     number, unsure = _first_of(view, bins, tile, x, y)

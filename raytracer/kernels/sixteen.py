@@ -305,6 +305,24 @@ def load_numbers(typing, array, i):
 
 
 @intrinsic
+def mark_block(typing, array, row, bits):
+    """Set the bits of a block, whose rows have a byte each of an int32 array, from that one on."""
+
+    def lower(context, builder, sig, args):
+        array, row, bits = args
+        start = builder.bitcast(context.make_array(sig.args[0])(context, builder, array).data, _BYTE.as_pointer())
+        place = builder.bitcast(builder.gep(start, [row]), _INT32.as_pointer())
+        marks = builder.load(place, align=1)
+        for line in range(SIDE):
+            own = builder.and_(bits, ir.Constant(_INT32, (1 << SIDE) - 1 << SIDE * line))
+            marks = builder.or_(marks, builder.shl(own, ir.Constant(_INT32, (8 - SIDE) * line)))
+        builder.store(marks, place, align=1)
+        return context.get_dummy_value()
+
+    return types.void(array, types.uint64, types.int32), lower
+
+
+@intrinsic
 def store_halves(typing, array, i, lanes):
     """Eight lanes as float32, from element i of an array on."""
 
