@@ -43,6 +43,8 @@ Call = Callable[..., Any]
 @cache
 def cores() -> int:
     """How many threads run at a time. (To ask the system takes a tenth of a millisecond.)"""
+    if hasattr(os, "sched_getaffinity"):  # the cores that this process may run on
+        return len(os.sched_getaffinity(os.getpid()))
     return os.cpu_count() or 1
 
 
@@ -132,7 +134,7 @@ class _Helpers:
     def _is_wanted(self) -> bool:
         """Whether there is a seat. Waits while a kernel that may offer some has to be compiled, or loaded."""
         while self.board[_ASKED] and not self.board[_SEATS]:
-            time.sleep(_NAP)
+            time.sleep(5 * _NAP)
         return bool(self.board[_SEATS])
 
     def rest(self) -> None:
@@ -149,13 +151,13 @@ class _Helpers:
 
     def call(self, kernels: ModuleType, seats: int, kernel: Call, *arguments: object) -> Any:
         """Call a kernel, with so many seats for others; returns once they have ended."""
-        self.make_way()
-        self.board[_ASKED] = 1  # before looking who is asleep, as they look after saying so
-        for _ in range(min(seats, len(self._asleep))):
-            with suppress(KeyError):  # somebody has woken in the meantime
-                self._asleep.pop()
-                self.tasks.put(None)
         try:
+            self.make_way()
+            self.board[_ASKED] = 1  # before looking who is asleep, as they look after saying so
+            for _ in range(min(seats, len(self._asleep))):
+                with suppress(KeyError):  # somebody has woken in the meantime
+                    self._asleep.pop()
+                    self.tasks.put(None)
             return kernel(self.board, seats, *arguments)
         finally:
             self.board[_ASKED] = 0
