@@ -17,8 +17,8 @@ import atexit
 import ctypes
 import os
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from functools import cache, partial
 from itertools import count
 from queue import SimpleQueue
@@ -32,7 +32,7 @@ from raytracer.arrays import APART, BOARD, aligned
 
 _BELL, _ASKED, _SEATS = 0, 1, APART  # where those are on the board, see `kernels.waiting`
 _TURNS = 60_000  # a millisecond, about: more than it takes to begin with the next picture
-_NAP = 2e-4  # seconds
+_NAP = 1e-3  # seconds
 _kernels: ModuleType | None = None
 
 Job = TypeVar("Job")
@@ -58,7 +58,9 @@ class _Task:
     """Work for whichever thread is idle first, unless it is called off before."""
 
     def __init__(self, work: Callable[[], object]) -> None:
-        self._work, self._claims, self._end = work, count(), SimpleQueue[BaseException | None]()
+        self._work, self._claims, self._end = work, count(), SimpleQueue[None]()
+        self._error: BaseException | None = None
+        self._is_over = False
         self.ended = np.zeros(1, np.int64)
 
     def claim(self) -> bool:
@@ -69,33 +71,26 @@ class _Task:
         """Do it, unless somebody else has claimed it; returns where to say that it has ended."""
         if not self.claim():
             return None
-        error = None
         try:
             self._work()
         except BaseException as raised:
-            error = raised
-        self._end.put(error)
+            self._error = raised
+        self._is_over = True
+        self._end.put(None)
         return self.ended
 
     def wait(self) -> BaseException | None:
-        """Until it has ended, also if that is interrupted; returns what was raised."""
-        error, interrupt = _insist(self._wait)
-        return interrupt or error
-
-    def _wait(self) -> BaseException | None:
-        if _kernels is not None:
-            _kernels.has_ended(self.ended, _TURNS)
-        return self._end.get()
-
-
-def _insist(do: Callable[[], Done]) -> tuple[Done, KeyboardInterrupt | None]:
-    """Do something, again if it is interrupted; returns what comes of it, and the interrupt."""
-    interrupted: KeyboardInterrupt | None = None
-    while True:
-        try:
-            return do(), interrupted
-        except KeyboardInterrupt as interrupt:
-            interrupted = interrupt
+        """Until it has ended, also if that is interrupted, by whatever; returns what was raised."""
+        interrupted: BaseException | None = None
+        while True:
+            try:
+                if _kernels is not None:
+                    _kernels.has_ended(self.ended, _TURNS)
+                while not self._is_over:
+                    self._end.get()
+                return interrupted or self._error
+            except BaseException as interrupt:
+                interrupted = interrupt
 
 
 class _Helpers:
@@ -105,7 +100,6 @@ class _Helpers:
         self.tasks = SimpleQueue[_Task | None]()  # None only wakes somebody, to help on the board
         self.board = aligned(BOARD, np.int64)
         self.board[:] = 0
-        self.free = Lock()  # the board
         self._asleep = set[int]()
         self._lingering = [Lock() for _ in range(max(1, cores() - 1))]  # held by those who do
         threads = [
@@ -134,7 +128,7 @@ class _Helpers:
     def _is_wanted(self) -> bool:
         """Whether there is a seat. Waits while a kernel that may offer some has to be compiled, or loaded."""
         while self.board[_ASKED] and not self.board[_SEATS]:
-            time.sleep(5 * _NAP)
+            time.sleep(_NAP)
         return bool(self.board[_SEATS])
 
     def rest(self) -> None:
@@ -149,8 +143,8 @@ class _Helpers:
             self.tasks.put(task)
         self.board[_BELL] += 1
 
-    def call(self, kernels: ModuleType, seats: int, kernel: Call, *arguments: object) -> Any:
-        """Call a kernel, with so many seats for others; returns once they have ended."""
+    def call(self, seats: int, kernel: Call, *arguments: object) -> Any:
+        """Call a kernel, with so many seats for others."""
         try:
             self.make_way()
             self.board[_ASKED] = 1  # before looking who is asleep, as they look after saying so
@@ -161,14 +155,6 @@ class _Helpers:
             return kernel(self.board, seats, *arguments)
         finally:
             self.board[_ASKED] = 0
-            _, interrupt = _insist(lambda: self._let_go(kernels))
-            if interrupt is not None:
-                raise interrupt
-
-    def _let_go(self, kernels: ModuleType) -> None:
-        """Until those who have helped have ended."""
-        while not kernels.are_gone(self.board, _TURNS):
-            time.sleep(_NAP)
 
     def make_way(self) -> None:
         """Keep them off the core of the thread that calls, if it may run on others and the system tells which it is."""
@@ -198,19 +184,34 @@ def _this_core() -> int | None:
     return core if core >= 0 else None
 
 
-_helpers = cache(_Helpers)
+_made: list[_Helpers] = []  # one at most
+_making = Lock()
+
+
+def _helpers() -> _Helpers:
+    if not _made:
+        with _making:
+            if not _made:
+                _made.append(_Helpers())
+    return _made[0]
 
 
 @atexit.register
 def _rest() -> None:
     global _kernels
     _kernels = None
-    if _helpers.cache_info().currsize:
-        _helpers().rest()
+    for helpers in _made:
+        helpers.rest()
+
+
+def _begin_anew() -> None:
+    global _making
+    _making = Lock()
+    _made.clear()
 
 
 if hasattr(os, "register_at_fork"):  # not on Windows
-    os.register_at_fork(after_in_child=_helpers.cache_clear)  # threads do not survive a fork
+    os.register_at_fork(after_in_child=_begin_anew)  # threads do not survive a fork
 
 
 _NO_BOARD = np.zeros(BOARD, np.int64)
@@ -221,20 +222,12 @@ def alone(kernel: Call, *arguments: object) -> Any:
     return kernel(_NO_BOARD, 0, *arguments)
 
 
-@contextmanager
-def together(threads: int) -> Iterator[Call]:
-    """How to call kernels so that this many threads are at work on each: `alone` if others are being helped already.
+def together(threads: int) -> Call:
+    """How to call kernels so that this many threads are at work on each, if they do not help another one.
 
     Such a kernel takes the board and a number of seats, and offers those as `kernels.waiting.offering` says.
     """
-    kernels, helpers = _kernels, _helpers() if threads > 1 else None
-    if kernels is None or helpers is None or not helpers.free.acquire(blocking=False):
-        yield alone
-        return
-    try:
-        yield partial(helpers.call, kernels, threads - 1)
-    finally:
-        helpers.free.release()
+    return alone if threads < 2 or _kernels is None else partial(_helpers().call, threads - 1)
 
 
 def _do(jobs: list[Job], work: Callable[[Job, int], Done], finished: Callable[[Done], object] | None) -> None:

@@ -151,13 +151,14 @@ def share_pieces(bands: list[slice], watch: Watch, work: Callable[[slice, int], 
 def _paint(easel: Easel, watch: Watch) -> None:
     """A stage that a kernel paints; numpy paints the pixels that kernels were not certain of."""
     screen, moments = easel.screen, easel.screen.moments(easel.plan.shading)
-    bands = screen.pieces(moments)
-    with together(screen.workers(moments)) as call:
-        for rows in bands:
-            watch.check()
-            easel.paint(screen.tiles_of(rows), call=call)
-            watch.tell(len(bands), rows)
-    easel.finish(*range(screen.threads))
+    bands, call, everyone = screen.pieces(moments), together(screen.workers(moments)), range(screen.threads)
+    for rows in bands:
+        watch.check()
+        easel.paint(screen.tiles_of(rows), call=call)
+        if len(bands) > 1 and screen.is_crowded:
+            easel.finish(*everyone)
+        watch.tell(len(bands), rows)
+    easel.finish(*everyone)
 
 
 @dataclass

@@ -256,6 +256,11 @@ class Screen(NamedTuple):
         getattr(self.kernels, kernel)(self.view, paints, t, index, *pixel, self.desks, worker, colours)
         return colours[:count]
 
+    @property
+    def is_crowded(self) -> bool:
+        """Whether some worker has many doubtful pixels on the list, and may soon do nothing more."""
+        return bool((self.desks.doubts[:, 0] > _DOUBTS // 4).any())
+
     def doubtful(self, *workers: int) -> Iterator[Pixels]:
         """The doubtful pixels that these workers have listed, all together, if there are any."""
         lists = [doubts for worker in workers if (doubts := self.desks.doubts[worker])[0]]
@@ -481,10 +486,10 @@ def _sort(
     if workspace.sorting is None or workspace.sorting[0] != key:
         workspace.sorting = key, *_piles(workspace, *key)
     _, piles, bins = workspace.sorting
-    with together(parts) as call:
-        while not call(kernels.sort, sight.glance, sight.lens, view, facet_boxes.reshape(-1), piles, bins):
-            workspace.sorting = key, *_piles(workspace, *key, (piles.found[:, 0] + kernels.SIXTEEN).tolist())
-            _, piles, bins = workspace.sorting
+    call = together(parts)
+    while not call(kernels.sort, sight.glance, sight.lens, view, facet_boxes.reshape(-1), piles, bins):
+        workspace.sorting = key, *_piles(workspace, *key, (piles.found[:, 0] + kernels.SIXTEEN).tolist())
+        _, piles, bins = workspace.sorting
     slow = zip(piles.cuts, piles.found[:parts, 1].tolist(), strict=False)
     return bins, np.concatenate([_NO_IDS, *(piles.slow[first : first + count] for first, count in slow if count)])
 

@@ -1,18 +1,19 @@
 """Work that is shared among threads."""
 
 import os
+import signal
 import subprocess
 import sys
 import threading
 import time
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from raytracer import backend, plain
-from raytracer.arrays import BOARD
+from raytracer import backend, plain, render_scene
+from raytracer.arrays import APART, BOARD
+from raytracer.bench import spread
 from raytracer.pool import alone, share, together
 
 KERNELS = backend.load()
@@ -111,7 +112,7 @@ def test_helpers_that_linger_help_again():
 
 if KERNELS is not plain:
     from raytracer.kernels.compiler import borrowing
-    from raytracer.kernels.waiting import add, becomes, offering
+    from raytracer.kernels.waiting import add, becomes, offering, wait_for_help
 
     @borrowing
     def _arrive(seats_taken, here, expected, seat):
@@ -120,16 +121,39 @@ if KERNELS is not plain:
         add(here, 0, 1)
         return becomes(here, 0, expected, 1 << 26)
 
-    _offer = offering(_arrive)
-
-    @borrowing
-    def _offer_one_seat(board, seats_taken, here):
-        _offer(board, 1, (seats_taken, here, 2))
+    _offer_to_arrive = offering(_arrive)
 
     @borrowing
     def _meet(board, seats, seats_taken, here, expected):
-        _offer(board, seats, (seats_taken, here, expected))
-        return _arrive(seats_taken, here, expected, 0)
+        helped = _offer_to_arrive(board, seats, (seats_taken, here, expected))
+        met = _arrive(seats_taken, here, expected, 0)
+        if helped:
+            wait_for_help(board)
+        return met
+
+    @borrowing
+    def _dawdle(begun, done, seat):
+        """The caller is done as soon as the helper has begun, who takes its time."""
+        if seat == 0:
+            becomes(begun, 0, 1, 1 << 26)
+        else:
+            begun[0] = 1
+            becomes(begun, 0, 2, 1 << 20)
+            done[0] = 1
+
+    _offer_to_dawdle = offering(_dawdle)
+
+    @borrowing
+    def _end_early(board, seats, begun, done):
+        helped = _offer_to_dawdle(board, seats, (begun, done))
+        _dawdle(begun, done, 0)
+        if helped:
+            wait_for_help(board)
+
+
+def own_process(program):
+    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, timeout=60, check=False)
+    return done.returncode, done.stdout, done.stderr
 
 
 def meet(call, taken, expected):
@@ -144,69 +168,89 @@ def test_a_kernel_is_helped_by_who_lingers_and_by_who_is_asleep(pause):
     taken = np.zeros(2, np.int64)
     for _ in range(5):
         time.sleep(pause)
-        with together(2) as call:
-            assert meet(call, taken, 2)
-            assert meet(call, taken, 2)
+        call = together(2)
+        assert meet(call, taken, 2)
+        assert meet(call, taken, 2)
     assert taken.tolist() == [10, 10]
 
 
 @compiled
 def test_seats_that_nobody_has_claimed_are_withdrawn():
     board, taken = np.zeros(BOARD, np.int64), np.zeros(9, np.int64)
-    assert _meet(board, 8, taken, np.zeros(1, np.int64), 1)
-    assert KERNELS.are_gone(board, 1)
-    KERNELS.linger(np.zeros(1, np.int64), board, 100)
-    assert taken.tolist() == [1] + [0] * 8
-
-
-@compiled
-def test_who_has_claimed_a_seat_is_waited_for():
-    board, taken, here = np.zeros(BOARD, np.int64), np.zeros(2, np.int64), np.zeros(1, np.int64)
-    _offer_one_seat(board, taken, here)
-    thread = threading.Thread(target=KERNELS.linger, args=(np.zeros(1, np.int64), board, 1 << 40), daemon=True)
-    thread.start()
-    for _ in range(5000):
-        time.sleep(0.001)
-        if taken[1]:
-            break
-    assert taken.tolist() == [0, 1]
-    assert not KERNELS.are_gone(board, 1000)
-    here[0] = 2
-    assert KERNELS.are_gone(board, 1 << 24)
-    board[0] += 1
-    thread.join(5)
-    assert not thread.is_alive()
-
-
-@compiled
-def test_who_cannot_be_helped_is_alone():
-    with together(1) as call:
-        assert call is alone
-    with together(2) as call, together(2) as other:
-        assert call is not alone
-        assert other is alone
-        assert meet(other, np.zeros(1, np.int64), 1)
-    with together(2) as call:
-        assert call is not alone
+    for count in (1, 2):
+        assert _meet(board, 8, taken, np.zeros(1, np.int64), 1)
+        KERNELS.linger(np.zeros(1, np.int64), board, 100)
+        assert taken.tolist() == [count] + [0] * 8
 
 
 @several_cores
 @compiled
-def test_an_interrupt_is_raised_once_the_helpers_have_ended(monkeypatch):
-    taken, board = np.zeros(2, np.int64), []
+def test_who_has_claimed_a_seat_is_waited_for():
+    call = together(2)
+    for _ in range(5):
+        begun, done = np.zeros(1, np.int64), np.zeros(1, np.int64)
+        call(_end_early, begun, done)
+        assert (begun[0], done[0]) == (1, 1)
 
-    def are_gone(array, turns):
-        if not board:
-            board.append(array)
-            raise KeyboardInterrupt
-        return KERNELS.are_gone(array, turns)
 
-    with pytest.raises(KeyboardInterrupt), together(2) as call:
-        call.func.__self__.call(SimpleNamespace(are_gone=are_gone), 1, _meet, taken, np.zeros(1, np.int64), 2)
+@compiled
+def test_who_cannot_be_helped_is_alone():
+    assert together(1) is alone
+    call, taken = together(2), np.zeros(1, np.int64)
+    board = call.func.__self__.board
+    board[APART + 1] = 1  # another caller has it
+    try:
+        assert meet(call, taken, 1)
+    finally:
+        board[APART + 1] = 0
+    assert taken.tolist() == [1]
+
+
+class InterruptError(Exception):
+    """From a signal."""
+
+
+@several_cores
+@compiled
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no timer")
+@pytest.mark.skipif(threading.current_thread() is not threading.main_thread(), reason="signals go to another thread")
+def test_nobody_is_at_work_any_more_once_an_interrupt_is_raised():
+    def interrupt(number, frame):
+        raise InterruptError
+
+    def draw_until(seconds):
+        signal.setitimer(signal.ITIMER_REAL, seconds)
+        while True:
+            render_scene(scene, "diffuse", 640, 360, out=out)
+
+    scene, out, rng = spread(300, seed=1), np.zeros((360, 640, 3), np.uint8), np.random.default_rng(1)
+    expected, before = render_scene(scene, "diffuse", 640, 360), signal.signal(signal.SIGALRM, interrupt)
+    try:
+        for _ in range(50):
+            with pytest.raises(InterruptError):
+                draw_until(rng.uniform(0.001, 0.004))
+            out[:] = 7
+            time.sleep(0.001)
+            assert (out == 7).all()
+    finally:
+        signal.signal(signal.SIGALRM, before)
+    np.testing.assert_array_equal(render_scene(scene, "diffuse", 640, 360), expected)
+    taken = np.zeros(2, np.int64)
+    assert meet(together(2), taken, 2)
     assert taken.tolist() == [1, 1]
-    assert KERNELS.are_gone(board[0], 1)
-    with together(2) as call:
-        assert meet(call, taken, 2)
+
+
+def test_threads_are_made_once():
+    """In a process of its own, where six ask at the same time."""
+    program = (
+        "import threading\nfrom raytracer import pool\n"
+        "ask = lambda: pool.share([0, 1], lambda job, worker: job, 2)\n"
+        "threads = [threading.Thread(target=ask) for _ in range(6)]\n"
+        "[thread.start() for thread in threads]\n[thread.join() for thread in threads]\n"
+        "names = [thread.name for thread in threading.enumerate() if thread.name.startswith('raytracer')]\n"
+        "print(len(names) == len(set(names)))\n"
+    )
+    assert own_process(program) == (0, b"True\n", b"")
 
 
 @compiled
@@ -218,8 +262,7 @@ def test_nobody_lingers_while_python_ends():
         "pool.share([0, 1], lambda job, worker: both.wait(), 2)\n"
         "start = time.perf_counter()\npool._rest()\nprint(time.perf_counter() - start < 0.5)\n"
     )
-    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, timeout=60, check=False)
-    assert (done.returncode, done.stdout, done.stderr) == (0, b"True\n", b"")
+    assert own_process(program) == (0, b"True\n", b"")
 
 
 def test_no_jobs_are_no_trouble():

@@ -27,7 +27,7 @@ with cache_named_after_sources():
     from raytracer.kernels.trace import fine_rays, nearest_given, nearest_twofold, polish, refine_given
     from raytracer.kernels.usual import usual_eye, usual_given
     from raytracer.kernels.visibility import candidates
-    from raytracer.kernels.waiting import are_gone, has_ended, linger
+    from raytracer.kernels.waiting import has_ended, linger
     from raytracer.kernels.whole import mean_of_blocks, paint_depth, paint_edges, range_of
 
 __all__ = [
@@ -37,7 +37,6 @@ __all__ = [
     "TILE_HEIGHT",
     "TILE_WIDTH",
     "along_curve",
-    "are_gone",
     "bound",
     "bound_images",
     "build",

@@ -13,7 +13,7 @@ from raytracer.arrays import APART, Records
 from raytracer.kernels.bounds import bound, record_boxes
 from raytracer.kernels.compiler import borrowing, called, inlined
 from raytracer.kernels.lanes import SIXTEEN, fetch_to_write
-from raytracer.kernels.waiting import add, offering, show, wait_for_another, wait_until
+from raytracer.kernels.waiting import add, offering, show, wait_for_another, wait_for_help, wait_until
 
 _TAKEN, _COUNTED, _STATE, _FILLED = (APART * place for place in range(4))
 _COUNTING, _FITS, _TOO_MANY = range(3)
@@ -54,8 +54,11 @@ def sort(board, seats, near, lens, view, facet_boxes, piles, bins):
     """
     for place in range(_FILLED + 1):
         piles.progress[place] = 0
-    _offer(board, seats, (near, lens, view, facet_boxes, piles, bins))
-    return _sort_parts(near, lens, view, facet_boxes, piles, bins, 0)
+    helped = _offer(board, seats, (near, lens, view, facet_boxes, piles, bins))
+    fits = _sort_parts(near, lens, view, facet_boxes, piles, bins, 0)
+    if helped:
+        wait_for_help(board)
+    return fits
 
 
 @inlined

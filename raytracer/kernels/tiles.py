@@ -43,7 +43,7 @@ from raytracer.kernels.quick import (
 from raytracer.kernels.strips import fetch_row, put_pixel, start_of
 from raytracer.kernels.surfaces import ball_of, diffuse_of_any, diffuse_of_spheres, line_of, normal, ray_of
 from raytracer.kernels.visibility import STRIDE, list_doubts, see_tile, see_tile_unchecked
-from raytracer.kernels.waiting import offering
+from raytracer.kernels.waiting import offering, wait_for_help
 from raytracer.shading import to_byte
 from raytracer.twofold import select
 
@@ -57,8 +57,11 @@ def _paint(board, seats, view, slow, bins, tiles, desks, worker, paints, out):
 
     Returns whether the caller still has room, so that all tiles are done, or taken.
     """
-    offer(board, seats, (view, slow, bins, tiles, desks, paints, out))
-    return work(view, slow, bins, tiles, desks, paints, out, worker)
+    helped = offer(board, seats, (view, slow, bins, tiles, desks, paints, out))
+    has_room = work(view, slow, bins, tiles, desks, paints, out, worker)
+    if helped:
+        wait_for_help(board)
+    return has_room
 
 
 def _work(view, slow, bins, tiles, desks, paints, out, worker):

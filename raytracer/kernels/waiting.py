@@ -2,13 +2,16 @@
 
 To be woken takes the system 0.1 ms, and the interpreter, which lets only one thread at it, as long again.
 
-    caller   ── kernel: offers seats ─ takes part ──────── are_gone ──   board   bell, asked | seats | busy | work | …
-    helper   ── linger ──────┐                       ┌── linger ──
-                             └ claims one: takes part ┘
+    caller   ── kernel: offers seats ── work ─────── waits ──   board   bell, asked | seats | busy | work | arguments …
+    helper   ── linger ──────┐                   ┌── linger ──
+                             └ claims one: work ─┘
 
-Whoever offers work writes it on the board, and how many may help. Who claims a seat before it is withdrawn does the
-same work with the same arguments, and the seat's number; so the caller keeps those until all have ended.
+Whoever offers work writes it on the board, unless another thread has, and how many may help. Who claims a seat before
+it is withdrawn does the same work with the same arguments, and the seat's number. All that is in one kernel: nothing
+that interrupts the interpreter comes between, and what the caller holds outlives the help.
 """
+
+import os
 
 from llvmlite import ir
 from numba.core import types
@@ -22,6 +25,8 @@ from raytracer.kernels.lanes import PROCESSOR
 _ALIGNED = 8
 _BELL, _SEATS, _BUSY, _WORK, _ARGUMENTS = (APART * place for place in range(5))  # on the board
 _ASKED = _BELL + 1  # whether a kernel has been called that may offer seats, and has not yet
+_TAKEN = _SEATS + 1  # whether somebody has written work there
+_SPIN = 1 << 14  # turns, after which a thread that waits lets others at its core
 _WORD = ir.IntType(64)
 
 
@@ -93,7 +98,8 @@ _BY_ADDRESS = types.voidptr, types.int64  # what a function is given that is cal
 def offering(work):
     """A part of kernels: `offer(board, seats, arguments)` lets so many of those who linger do work(*arguments, seat).
 
-    Seats are counted from 1. `work` is a kernel, and borrows what it is given.
+    Seats are counted from 1. `work` is a kernel, and borrows what it is given. It returns whether anybody may help, who
+    is to be waited for then, by `wait_for_help`.
     """
 
     @intrinsic
@@ -111,11 +117,24 @@ def offering(work):
 
 
 def _offer(board, seats, arguments):
-    if seats > 0:
-        write_work(board, arguments)
-        show(board, _BUSY, seats)
-        show(board, _SEATS, seats)
-        show(board, _ASKED, 0)
+    if seats <= 0 or not _replace(board, _TAKEN, 0, 1):
+        return False
+    write_work(board, arguments)
+    show(board, _BUSY, seats)
+    show(board, _SEATS, seats)
+    show(board, _ASKED, 0)
+    return True
+
+
+@inlined
+def wait_for_help(board):
+    """Withdraw the seats that nobody has claimed, and wait until those who have are done."""
+    left = seen(board, _SEATS)
+    while not _replace(board, _SEATS, left, 0):
+        left = seen(board, _SEATS)
+    add(board, _BUSY, -left)
+    wait_until(board, _BUSY, 0)
+    show(board, _TAKEN, 0)
 
 
 def _write(context, builder, kinds, values, call):
@@ -156,6 +175,18 @@ def _do_work(typing, board, seat):
     return types.void(board, types.int64), lower
 
 
+@intrinsic
+def _make_way(typing):
+    """Let another thread run that waits for this core, if the system can be told so."""
+
+    def lower(context, builder, sig, args):
+        if hasattr(os, "sched_yield"):
+            builder.call(get_or_insert_function(builder.module, ir.FunctionType(ir.IntType(32), []), "sched_yield"), [])
+        return context.get_dummy_value()
+
+    return types.void(), lower
+
+
 @inlined
 def becomes(array, at, number, turns):
     """Whether an element is that number before so many turns are over."""
@@ -169,16 +200,19 @@ def becomes(array, at, number, turns):
 @inlined
 def wait_until(array, at, number):
     """Until an element is that number: another thread is about to write it."""
-    while seen(array, at) != number:
-        _pause()
+    while not becomes(array, at, number, _SPIN):
+        _make_way()
 
 
 @inlined
 def wait_for_another(array, at, number):
     """Until an element is another one than that; returns what it is."""
-    while seen(array, at) == number:
-        _pause()
-    return seen(array, at)
+    while True:
+        for _ in range(_SPIN):
+            if seen(array, at) != number:
+                return seen(array, at)
+            _pause()
+        _make_way()
 
 
 @inlined
@@ -202,16 +236,6 @@ def linger(ended, board, turns):
             turn = 0
         _pause()
         turn += 1
-
-
-@borrowing("boolean(int64[::1], int64)")
-def are_gone(board, turns):
-    """Withdraw the seats that nobody has claimed; whether those who have end before so many turns are over."""
-    open_seats = seen(board, _SEATS)
-    while not _replace(board, _SEATS, open_seats, 0):
-        open_seats = seen(board, _SEATS)
-    add(board, _BUSY, -open_seats)
-    return becomes(board, _BUSY, 0, turns)
 
 
 @borrowing("boolean(int64[::1], int64)")
