@@ -210,6 +210,10 @@ class Tree(NamedTuple):
 
 APART = 16  # int64 from what one thread counts to what another does
 BOARD = 4 * APART + 1024  # int64 of what threads tell each other: see `kernels.waiting`
+BELL = 0  # where on the board: a number that is another one when those who linger are to come back
+ASKED = 1  # whether a kernel has been called that may offer seats, and has not yet
+SEATS = APART  # how many seats are open
+TAKEN = APART + 1  # whether somebody has written work on the board
 FACET = 24  # numbers a triangle, of which some are to spare
 CELL_BITS = 7  # a cell of `Cells` is at most 2**7 pixels wide and high
 CORNERS = 12  # numbers a triangle at the stage `full`: its corners, how far away they are, and some to spare

@@ -28,9 +28,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from raytracer.arrays import APART, BOARD, aligned
+from raytracer.arrays import ASKED, BELL, BOARD, SEATS, aligned
 
-_BELL, _ASKED, _SEATS = 0, 1, APART  # where those are on the board, see `kernels.waiting`
 _TURNS = 60_000  # a millisecond, about: more than it takes to begin with the next picture
 _NAP = 1e-3  # seconds
 _kernels: ModuleType | None = None
@@ -127,13 +126,13 @@ class _Helpers:
 
     def _is_wanted(self) -> bool:
         """Whether there is a seat. Waits while a kernel that may offer some has to be compiled, or loaded."""
-        while self.board[_ASKED] and not self.board[_SEATS]:
+        while self.board[ASKED] and not self.board[SEATS]:
             time.sleep(_NAP)
-        return bool(self.board[_SEATS])
+        return bool(self.board[SEATS])
 
     def rest(self) -> None:
         """Let nobody linger any more: a thread that comes back while Python ends finds no interpreter."""
-        self.board[_BELL] += 1
+        self.board[BELL] += 1
         for lock in self._lingering:
             lock.acquire(timeout=1)
 
@@ -141,20 +140,20 @@ class _Helpers:
         self.make_way()
         for task in tasks:
             self.tasks.put(task)
-        self.board[_BELL] += 1
+        self.board[BELL] += 1
 
     def call(self, seats: int, kernel: Call, *arguments: object) -> Any:
         """Call a kernel, with so many seats for others."""
         try:
             self.make_way()
-            self.board[_ASKED] = 1  # before looking who is asleep, as they look after saying so
+            self.board[ASKED] = 1  # before looking who is asleep, as they look after saying so
             for _ in range(min(seats, len(self._asleep))):
                 with suppress(KeyError):  # somebody has woken in the meantime
                     self._asleep.pop()
                     self.tasks.put(None)
             return kernel(self.board, seats, *arguments)
         finally:
-            self.board[_ASKED] = 0
+            self.board[ASKED] = 0
 
     def make_way(self) -> None:
         """Keep them off the core of the thread that calls, if it may run on others and the system tells which it is."""

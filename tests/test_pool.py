@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from raytracer import backend, plain, render_scene
-from raytracer.arrays import APART, BOARD
+from raytracer.arrays import BELL, BOARD, TAKEN
 from raytracer.bench import spread
 from raytracer.pool import alone, share, together
 
@@ -91,7 +91,7 @@ def test_who_lingers_says_first_that_the_task_has_ended_and_goes_when_the_bell_r
     assert KERNELS.has_ended(ended, 1 << 40)
     thread.join(0.05)
     assert thread.is_alive()
-    board[0] += 1
+    board[BELL] += 1
     thread.join(5)
     assert not thread.is_alive()
     KERNELS.linger(ended, board, 10)  # and not for ever
@@ -198,11 +198,11 @@ def test_who_cannot_be_helped_is_alone():
     assert together(1) is alone
     call, taken = together(2), np.zeros(1, np.int64)
     board = call.func.__self__.board
-    board[APART + 1] = 1  # another caller has it
+    board[TAKEN] = 1  # another caller has it
     try:
         assert meet(call, taken, 1)
     finally:
-        board[APART + 1] = 0
+        board[TAKEN] = 0
     assert taken.tolist() == [1]
 
 

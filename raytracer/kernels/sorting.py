@@ -13,10 +13,10 @@ from raytracer.arrays import APART, Records
 from raytracer.kernels.bounds import bound, record_boxes
 from raytracer.kernels.compiler import borrowing, called, inlined
 from raytracer.kernels.lanes import SIXTEEN, fetch_to_write
-from raytracer.kernels.waiting import add, offering, show, wait_for_another, wait_for_help, wait_until
+from raytracer.kernels.waiting import add, offering, show, wait_for_help, wait_until
 
-_TAKEN, _COUNTED, _STATE, _FILLED = (APART * place for place in range(4))
-_COUNTING, _FITS, _TOO_MANY = range(3)
+_TAKEN, _COUNTED, _BEGUN, _FILLED = (APART * place for place in range(4))  # of the progress
+_FITS = _BEGUN + 1  # whether all records are there, once the lists are begun
 _SPARE = 32  # list entries beyond the last that a kernel may look at
 
 
@@ -34,9 +34,10 @@ def _sort_parts(near, lens, view, facet_boxes, piles, bins, worker):
         part = add(progress, _TAKEN, 1)
     if worker == 0:
         wait_until(progress, _COUNTED, parts)
-        show(progress, _STATE, _FITS if _begin(piles, bins) else _TOO_MANY)
-    fits = wait_for_another(progress, _STATE, _COUNTING) == _FITS
-    part = add(progress, _FILLED, 1)
+        progress[_FITS] = _begin(piles, bins)
+        show(progress, _BEGUN, 1)
+    wait_until(progress, _BEGUN, 1)
+    fits, part = progress[_FITS] != 0, add(progress, _FILLED, 1)
     while fits and part < parts:
         _fill(_records_of(piles, part), piles.found[part, 0], piles.counts[part], bins.entries)
         part = add(progress, _FILLED, 1)

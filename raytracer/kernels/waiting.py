@@ -18,14 +18,12 @@ from numba.core import types
 from numba.core.cgutils import get_or_insert_function
 from numba.extending import intrinsic
 
-from raytracer.arrays import APART, BOARD
+from raytracer.arrays import APART, ASKED, BELL, BOARD, SEATS, TAKEN
 from raytracer.kernels.compiler import borrowing, inlined, variant
 from raytracer.kernels.lanes import PROCESSOR
 
 _ALIGNED = 8
-_BELL, _SEATS, _BUSY, _WORK, _ARGUMENTS = (APART * place for place in range(5))  # on the board
-_ASKED = _BELL + 1  # whether a kernel has been called that may offer seats, and has not yet
-_TAKEN = _SEATS + 1  # whether somebody has written work there
+_BUSY, _WORK, _ARGUMENTS = (APART * place for place in range(2, 5))  # on the board as well
 _SPIN = 1 << 14  # turns, after which a thread that waits lets others at its core
 _WORD = ir.IntType(64)
 
@@ -117,24 +115,24 @@ def offering(work):
 
 
 def _offer(board, seats, arguments):
-    if seats <= 0 or not _replace(board, _TAKEN, 0, 1):
+    if seats <= 0 or not _replace(board, TAKEN, 0, 1):
         return False
     write_work(board, arguments)
     show(board, _BUSY, seats)
-    show(board, _SEATS, seats)
-    show(board, _ASKED, 0)
+    show(board, SEATS, seats)
+    show(board, ASKED, 0)
     return True
 
 
 @inlined
 def wait_for_help(board):
     """Withdraw the seats that nobody has claimed, and wait until those who have are done."""
-    left = seen(board, _SEATS)
-    while not _replace(board, _SEATS, left, 0):
-        left = seen(board, _SEATS)
+    left = seen(board, SEATS)
+    while not _replace(board, SEATS, left, 0):
+        left = seen(board, SEATS)
     add(board, _BUSY, -left)
     wait_until(board, _BUSY, 0)
-    show(board, _TAKEN, 0)
+    show(board, TAKEN, 0)
 
 
 def _write(context, builder, kinds, values, call):
@@ -205,21 +203,10 @@ def wait_until(array, at, number):
 
 
 @inlined
-def wait_for_another(array, at, number):
-    """Until an element is another one than that; returns what it is."""
-    while True:
-        for _ in range(_SPIN):
-            if seen(array, at) != number:
-                return seen(array, at)
-            _pause()
-        _make_way()
-
-
-@inlined
 def _help(board):
     """Claim a seat and do the work, if there is one; returns whether there was."""
-    seat = seen(board, _SEATS)
-    if seat <= 0 or not _replace(board, _SEATS, seat, seat - 1):
+    seat = seen(board, SEATS)
+    if seat <= 0 or not _replace(board, SEATS, seat, seat - 1):
         return False
     _do_work(board, seat)
     add(board, _BUSY, -1)
@@ -229,9 +216,9 @@ def _help(board):
 @borrowing("void(int64[::1], int64[::1], int64)")
 def linger(ended, board, turns):
     """Say that something has ended, then help until the bell rings, or until nobody wants help for so many turns."""
-    before, turn = seen(board, _BELL), 0
+    before, turn = seen(board, BELL), 0
     show(ended, 0, 1)
-    while turn < turns and seen(board, _BELL) == before:
+    while turn < turns and seen(board, BELL) == before:
         if _help(board):
             turn = 0
         _pause()
