@@ -12,6 +12,7 @@ import numpy as np
 
 from raytracer.kernels.compiler import inlined
 from raytracer.kernels.lanes import smallest_of, spread
+from raytracer.kernels.sixteen import greater, lesser
 from raytracer.quick import LIGHT, coarseness_of, flattest_of
 from raytracer.twofold import select
 
@@ -36,10 +37,10 @@ def widened(extremes, listed, blur, radius, depth):
     """The extremes, in each of eight lanes, after another eight spheres, or those of them that are listed."""
     blurriest, widest, nearest, farthest = extremes
     return (
-        select(listed & (blur > blurriest), blur, blurriest),
-        select(listed & (radius > widest), radius, widest),
-        select(listed & (depth < nearest), depth, nearest),
-        select(listed & (depth > farthest), depth, farthest),
+        select(listed, greater(blur, blurriest), blurriest),
+        select(listed, greater(radius, widest), widest),
+        select(listed, lesser(depth, nearest), nearest),
+        select(listed, greater(depth, farthest), farthest),
     )
 
 

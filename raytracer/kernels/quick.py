@@ -113,27 +113,26 @@ def _draw_all(view, bins, first, end, tile, paints, sheet):
         store(sheet.depth, p, spread(np.float32(np.inf)))
         store(sheet.number, p, sixteen(0))
     store(sheet.table, 0, spread(_ZERO))
-    tie, extremes, s = 0.0, no_extremes(), _longest(paints.quick, tile) / paints.quick.focus
+    tie, extremes, s = (0.0, 0.0), no_extremes(), _longest(paints.quick, tile) / paints.quick.focus
     for at in range(first, end, WIDTH):
         count, row = min(WIDTH, end - at), np.uint64(at - first)
-        unfit, near, blur, radius, depth = look(view, bins, np.uint64(at), row, tile, s, paints, sheet)
+        listed = mask_of((1 << count) - 1)
+        unfit, tie, blur, radius, depth = look(view, bins, np.uint64(at), row, tile, s, listed, tie, paints, sheet)
         if bits_of(unfit) & ((1 << count) - 1):
             return False, extremes
-        listed = mask_of((1 << count) - 1)
-        tie = max(tie, largest(select(listed, near, 0.0)))
-        over_tie = np.float32(1.0 / tie)
         extremes = widened(extremes, listed, blur, radius, depth)
         for j in range(np.uint64(0), np.uint64(count)):
             place = np.uint64(at) + j
             fetch(view, sphere_of(bins.entries[place + np.uint64(AHEAD)]))
-            draw(bins.entries[place], np.int32(row + j + _ONE), j, over_tie, sheet)
+            draw(bins.entries[place], np.int32(row + j + _ONE), j, sheet)
     return True, extremes
 
 
-def _look(view, bins, at, row, tile, s, paints, sheet):
+def _look(view, bins, at, row, tile, s, listed, tie, paints, sheet):
     """Work out what is drawn and shaded of the next eight spheres of a list.
 
-    Returns for which of them single precision is not, how much k may be off, and 1 / w, radius and depth.
+    Returns for which of them single precision is not; how much k may be off by now, and 1 by the root of that; and
+    1 / w, radius and depth.
     """
     quick, batch, where = paints.quick, sheet.batch, load_low(bins.entries, at)
     x, y, z, radius = gather_rows(view.balls, where)
@@ -144,8 +143,15 @@ def _look(view, bins, at, row, tile, s, paints, sheet):
     u = inner(quick.u[0], quick.u[1], quick.u[2], x, y, z) * over
     v = inner(quick.v[0], quick.v[1], quick.v[2], x, y, z) * over
     rho, blur = radius * over, over_rho * pixel
-    u2, v2, rho2, square = u * u, v * v, rho * rho, blur * blur
-    m, error = 1.0 + u2 + v2, error_of(quick.steep, rho, blur)
+    u2, v2, rho2 = u * u, v * v, rho * rho
+    m, error, scale, half = 1.0 + u2 + v2, error_of(quick.steep, rho, blur), 1.0, -0.5 * radius
+    if certain:
+        near = largest(select(listed, near_of(rho, error), 0.0))
+        if near > tie[0]:  # seldom, so nothing waits for it
+            tie = near, 1.0 / np.sqrt(near)
+        part = error * over * (4.0 / _LARGEST_K)
+        scale, half = tie[0] / part, half * tie[1] * np.sqrt(part)
+    square, step = blur * blur * scale, pixel * scale
     unfit = ~((depth > NEAREST) & (depth < FARTHEST) & (rho <= 0.25) & (blur < 128.0) & (m < quick.widest))
     middle_x = u * quick.focus + (quick.middle_x - (tile.left + _MIDDLE))
     middle_y = (quick.middle_y - (tile.top + _MIDDLE_Y)) - v * quick.focus
@@ -154,32 +160,32 @@ def _look(view, bins, at, row, tile, s, paints, sheet):
     store_halves(batch, 8, middle_x - whole_x)
     store_halves(batch, 16, whole_y)
     store_halves(batch, 24, middle_y - whole_y)
-    store_halves(batch, 32, m)
-    store_halves(batch, 40, u * (2.0 * pixel))
-    store_halves(batch, 48, v * (-2.0 * pixel))
+    store_halves(batch, 32, m * scale)
+    store_halves(batch, 40, u * (step + step))
+    store_halves(batch, 48, -v * (step + step))
     store_halves(batch, 56, (1.0 + v2 - rho2) * square)
     store_halves(batch, 64, u * v * (square + square))
     store_halves(batch, 72, (1.0 + u2 - rho2) * square)
     store_halves(batch, 80, depth * m)
     store_halves(batch, 88, depth * u * pixel)
     store_halves(batch, 96, depth * v * -pixel)
-    store_halves(batch, 104, -0.5 * radius)
-    store_halves(batch, 112, 4.0 * error * m)
-    store_halves(batch, 120, (4.0 / _LARGEST_K) * error * over)
+    store_halves(batch, 104, half)
+    if certain:
+        store_halves(batch, 112, (_LARGEST_K * tie[0]) * (depth * m))
     if shades:
         parts = np.float64(quick.parts)
-        size, scale = rho * (quick.focus * parts), (255.0 / parts) * blur
+        large, by_colour = rho * (quick.focus * parts), (255.0 / parts) * blur
         red, green, blue, _ = gather_rows(paints.colours, gather(view.material, where))
         brightest = 255.0 * greater(greater(red, green), blue)
         off = coarseness_of(quick.parts, blur, s, quick.focus, quick.widest) * brightest
         store_table(
-            sheet.table, row + _ONE, middle_x * parts, middle_y * parts, size, depth * (pixel / parts), red * scale,
-            green * scale, blue * scale, off,
+            sheet.table, row + _ONE, middle_x * parts, middle_y * parts, large, depth * (pixel / parts),
+            red * by_colour, green * by_colour, blue * by_colour, off,
         )  # fmt: skip
-    return unfit, near_of(rho, error), blur, radius, depth
+    return unfit, tie, blur, radius, depth
 
 
-def _draw(entry, number, j, over_tie, sheet):
+def _draw(entry, number, j, sheet):
     """Draw the sphere of an entry, number j of the eight that were looked at."""
     b, eight = sheet.batch, np.uint64(8)
     start, stop, high, low = corners_of(entry)
@@ -187,7 +193,7 @@ def _draw(entry, number, j, over_tie, sheet):
     middle, e1, e2, xx = b[np.uint64(32) + j], b[np.uint64(40) + j], b[np.uint64(48) + j], b[np.uint64(56) + j]
     xy, yy, k0, k1 = b[np.uint64(64) + j], b[np.uint64(72) + j], b[np.uint64(80) + j], b[np.uint64(88) + j]
     k2, half, rim = b[np.uint64(96) + j], b[np.uint64(104) + j], b[np.uint64(112) + j]
-    own, by_rim = sixteen(number), b[np.uint64(120) + j] * over_tie
+    own = sixteen(number)
     left, right = start // SIDE, (stop + SIDE - 1) // SIDE
     lines = (low - high + SIDE - 1) // SIDE
     top = min(high, TILE_HEIGHT - SIDE * lines)
@@ -205,7 +211,7 @@ def _draw(entry, number, j, over_tie, sheet):
             store(sheet.depth, p, blend(wins, k, best))
             store(sheet.number, p, blend(wins, own, load_numbers(sheet.number, p)))
             if certain:
-                unsure = smaller_size(disc, (k - best) * by_rim) <= rim  # also where k is not a number
+                unsure = smaller_size(disc, k - best) <= rim  # also where k is not a number
                 if any_of(unsure):
                     mark_block(sheet.doubt, p // np.uint64(SIDE), bits_of(unsure))
             shift += _STEP
@@ -447,11 +453,12 @@ def nothing_left(view, paints, scratch, doubts, out):
 
 _certain_sphere = variant(_draw, "_certain_sphere", inlined, certain=True)
 _unchecked_sphere = variant(_draw, "_unchecked_sphere", inlined, certain=False)
-_look_at_shape = variant(_look, "_look_at_shape", inlined, shades=False)
-_look_at_all = variant(_look, "_look_at_all", inlined, shades=True)
+_look_at_shape = variant(_look, "_look_at_shape", inlined, certain=True, shades=False)
+_look_at_all = variant(_look, "_look_at_all", inlined, certain=True, shades=True)
+_look_unchecked = variant(_look, "_look_unchecked", inlined, certain=False, shades=True)
 _draw_shapes = variant(_draw_all, "_draw_shapes", draw=_certain_sphere, look=_look_at_shape)
 _draw_certain = variant(_draw_all, "_draw_certain", draw=_certain_sphere, look=_look_at_all)
-_draw_unchecked = variant(_draw_all, "_draw_unchecked", draw=_unchecked_sphere, look=_look_at_all)
+_draw_unchecked = variant(_draw_all, "_draw_unchecked", draw=_unchecked_sphere, look=_look_unchecked)
 _shade_certain = variant(_shade, "_shade_certain", inlined, certain=True, shade_alike=shade_alike)
 _shade_unchecked = variant(_shade, "_shade_unchecked", inlined, certain=False, shade_alike=shade_alike_unchecked)
 _colour_flat = variant(_colour_all, "_colour_flat", colour_tile=_flat)
