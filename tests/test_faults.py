@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from contextlib import suppress
 from pathlib import Path
@@ -195,6 +196,42 @@ def test_interrupted_work_leaves_threads_that_end():
     )
     done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, timeout=30, check=False)
     assert (done.stdout, done.stderr) == (b"[1, 2, 3]\n", b"")
+
+
+@posix
+def test_what_interrupts_the_main_thread_leaves_the_compiler_alone():
+    """Compiling goes on in a thread of its own: in the main thread, locks would stay taken. And nobody waits for it."""
+    pytest.importorskip("numba")
+    from raytracer.kernels.compiler import apart
+
+    begun, go_on, ended = threading.Event(), threading.Event(), threading.Event()
+
+    def compile_(signature):
+        begun.set()
+        assert go_on.wait(30)
+        ended.set()
+
+    def interrupt():
+        assert begun.wait(30)
+        signal.pthread_kill(threading.main_thread().ident, signal.SIGINT)
+
+    threading.Thread(target=interrupt).start()
+    with pytest.raises(KeyboardInterrupt):
+        apart(compile_)(())
+    assert not ended.is_set()
+    go_on.set()
+    assert ended.wait(30)
+
+
+def test_what_goes_wrong_while_compiling_is_raised():
+    pytest.importorskip("numba")
+    from raytracer.kernels.compiler import compiled
+
+    def nonsense(x):
+        return x.there_is_no_such_thing
+
+    with pytest.raises(Exception, match="there_is_no_such_thing"):
+        compiled(nonsense)(1)
 
 
 # --------------------------------------------------------------------------------------------- nowhere to keep anything

@@ -9,12 +9,16 @@ is kept, `machine_code` says.
 
 from __future__ import annotations
 
+import atexit
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
 from contextlib import contextmanager
-from functools import partial
+from functools import partial, wraps
 from importlib import import_module
+from threading import Thread, current_thread, main_thread
 from types import FunctionType, ModuleType
+from typing import Any
 
 import numba
 from numba.extending import overload, register_jitable
@@ -67,7 +71,51 @@ for _name in machine_code.SOURCES:
 
 
 _CACHE = machine_code.folder()
-compiled = partial(numba.njit, cache=_CACHE is not None, nogil=True, error_model="numpy", no_cfunc_wrapper=True)
+_PATIENCE = 0.5  # seconds
+_at_work: list[Thread] = []
+
+
+def apart(compile_: Callable[[object], object]) -> Callable[[object], object]:
+    """Compile in a thread of its own if it is the main thread that wants to, which waits.
+
+    An exception that a signal raises in the middle of it leaves locks behind that others wait for, or ends the process
+    where it hits a part of LLVM that asks Python for something; and it takes as long as compiling does to be answered.
+    """
+
+    @wraps(compile_)
+    def compileapart(signature: object) -> object:
+        if current_thread() is not main_thread():
+            return compile_(signature)
+        made = Future[object]()
+
+        def work() -> None:
+            _at_work.append(current_thread())
+            try:
+                made.set_result(compile_(signature))
+            except BaseException as error:
+                made.set_exception(error)
+            _at_work.remove(current_thread())
+
+        Thread(target=work, name="compiler", daemon=True).start()
+        return made.result()
+
+    return compileapart
+
+
+@atexit.register
+def _let_end() -> None:
+    """What is only loaded ends soon, and then meets no interpreter that is half gone."""
+    for thread in tuple(_at_work):
+        thread.join(_PATIENCE)
+
+
+def compiled(function: FunctionType, **options: object) -> Any:
+    """A kernel made of a function."""
+    kept = _CACHE is not None
+    kernel = numba.njit(function, cache=kept, nogil=True, error_model="numpy", no_cfunc_wrapper=True, **options)
+    kernel.compile = apart(kernel.compile)
+    return kernel
+
 
 # For kernels that make no arrays: without counting who still uses those that they are given.
 borrowing = partial(compiled, _nrt=False)

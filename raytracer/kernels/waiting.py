@@ -213,7 +213,7 @@ def _help(board):
     return True
 
 
-@borrowing("void(int64[::1], int64[::1], int64)")
+@borrowing
 def linger(ended, board, turns):
     """Say that something has ended, then help until the bell rings, or until nobody wants help for so many turns."""
     before, turn = seen(board, BELL), 0
@@ -225,7 +225,7 @@ def linger(ended, board, turns):
         turn += 1
 
 
-@borrowing("boolean(int64[::1], int64)")
+@borrowing
 def has_ended(ended, turns):
     """Whether something has ended before so many turns are over."""
     return becomes(ended, 0, 1, turns)
