@@ -115,6 +115,7 @@ class Renderer:
         self._thread = threading.Thread(target=self._work, name="renderer", daemon=True)
         self._thread.start()
         self._loader = threading.Thread(target=self._load, name="loader", daemon=True)
+        self._maker: threading.Thread | None = None  # of machine code that somebody has waited for
 
     def post(self, request: Request) -> None:
         """Ask for a picture; one that is being drawn is given up."""
@@ -201,6 +202,8 @@ class Renderer:
             return self._closed or (wanted is not None and (late or not wanted.is_like(request)))
 
         plan = make_plan(scene, request.stage, size, size, method=request.method)
+        if plan.painter and not backend.is_ready(plan.painter):
+            raise Cancelled  # what is at rest waits for that
         try:
             picture = enlarged(draw(plan, cancelled=given_up), request.size)
         finally:
@@ -258,6 +261,8 @@ class Renderer:
         if plan.painter and not backend.is_ready(plan.painter):
             self.drawing = replace(drawing, compiling=True)
             self._changed()
+            self._make_ready(plan.painter, self.drawing)
+            start = time.perf_counter()
 
         def progress(done: int, total: int, rows: slice) -> None:
             nonlocal looked
@@ -276,6 +281,24 @@ class Renderer:
             self._pace.took(1, elapsed, plan.path_name)
         wrong = _wrong(request, drawing.picture)
         self.drawing = self.whole = replace(drawing, done=1.0, milliseconds=elapsed, wrong=wrong, parts=parts)
+
+    def _make_ready(self, kernel: str, drawing: Drawing) -> None:
+        """Wait for a kernel's machine code, which takes long, and goes on if nobody waits any more."""
+        maker = None
+        while not backend.is_ready(kernel) and (maker is None or maker.is_alive()):
+            if self._maker is None or not self._maker.is_alive():
+                self._maker = maker = threading.Thread(target=self._make, args=(drawing,), name="maker", daemon=True)
+                maker.start()
+            self._maker.join(_PATIENCE)
+            if self._superseded():
+                raise Cancelled
+
+    def _make(self, drawing: Drawing) -> None:
+        try:
+            bring_in_kernels(drawing)
+        except BaseException as failure:
+            self.failure = failure
+            self._changed()
 
     def _draw_by_plug(self, drawing: Drawing) -> str:
         """Have the plugged file draw; which of its parts did, or nothing if it has none in this picture."""

@@ -14,10 +14,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from raytracer import METHODS, Cancelled, backend, eye_hits, interpreter, machine_code, plain, render_scene
+from raytracer import METHODS, Cancelled, backend, eye_hits, interpreter, machine_code, make_plan, plain, render_scene
 from raytracer.render import draw
 from sketch import pace, worker
-from sketch.orbit import HOME, seen_from
+from sketch.orbit import HOME, Orbit, seen_from
 from sketch.pace import enlarged
 from sketch.worker import Drawing, Renderer, Request
 
@@ -202,6 +202,35 @@ def test_waiting_for_machine_code_is_told(renderer, scene, monkeypatch):
         answer(renderer, Request(scene, "hit" if kept else "outline", SIZE))
         assert not renderer.drawing.compiling
         assert any(told) != kept
+
+
+def test_who_waits_for_machine_code_may_want_something_else(renderer, scene, monkeypatch):
+    """The next picture does not wait, nor does a frame; what has been begun is not begun again."""
+    if backend.why_no_compiler():
+        pytest.skip("numba is not installed")
+    backend.load()
+    made, may_end = [], threading.Event()
+
+    def make_slowly(drawing):
+        made.append(drawing.request.stage)
+        assert may_end.wait(10)
+
+    monkeypatch.setattr(worker, "bring_in_kernels", make_slowly)
+    monkeypatch.setattr(backend, "is_ready", lambda kernel: kernel != "paint_normal" or may_end.is_set())
+    first = Request(scene, "normal", SIZE)
+    for _ in range(2):
+        renderer.post(first)
+        wait_until(lambda: made and renderer.drawing.request == first and renderer.drawing.compiling)
+        answer(renderer, Request(scene, "hit", SIZE))
+    renderer.post(first)
+    wait_until(lambda: renderer.drawing.request == first)
+    renderer.post(turned := replace(first, orbit=Orbit(right=10)))
+    wait_until(lambda: renderer.drawing.request == turned and renderer.drawing.compiling)
+    assert made == ["normal"]
+    may_end.set()
+    wait_until(lambda: renderer.drawing.full)
+    assert np.array_equal(renderer.drawing.picture, draw(make_plan(renderer.drawing.scene, "normal", SIZE, SIZE)))
+    assert renderer.failure is None
 
 
 def test_machine_code_that_cannot_be_kept_is_waited_for_once(renderer, scene, monkeypatch):
