@@ -614,4 +614,7 @@ def _one_line(error: Exception) -> str:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    _status = main()
+    if interrupts.came():
+        interrupts.leave(_status)
+    sys.exit(_status)

@@ -11,6 +11,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
+from typing import NoReturn
 
 _ENDING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 _came: list[int] = []  # of these
@@ -64,3 +65,9 @@ def came() -> bool:
 def status() -> int:
     """The exit status that says so, as shells count: 130 for Ctrl-C; 0 if nobody has."""
     return 128 + _came[0] if _came else 0
+
+
+def leave(status: int) -> NoReturn:
+    """End the process with this exit status, whatever threads are at: what is being compiled would be waited for."""
+    sys.stderr.flush()
+    os._exit(status)

@@ -223,6 +223,19 @@ def test_what_interrupts_the_main_thread_leaves_the_compiler_alone():
     assert ended.wait(30)
 
 
+@posix
+def test_python_does_not_end_while_something_is_compiled():
+    pytest.importorskip("numba")
+    program = (
+        "import os, signal, time\nfrom raytracer.kernels.compiler import apart\n"
+        "def compile_(signature):\n"
+        "    os.kill(os.getpid(), signal.SIGINT)\n    time.sleep(0.3)\n    print('made', flush=True)\n"
+        "try:\n    apart(compile_)(())\nexcept KeyboardInterrupt:\n    print('interrupted', flush=True)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert (done.stdout, done.stderr) == ("interrupted\nmade\n", "")
+
+
 def test_what_goes_wrong_while_compiling_is_raised():
     pytest.importorskip("numba")
     from raytracer.kernels.compiler import compiled

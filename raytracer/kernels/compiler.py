@@ -71,7 +71,6 @@ for _name in machine_code.SOURCES:
 
 
 _CACHE = machine_code.folder()
-_PATIENCE = 0.5  # seconds
 _at_work: list[Thread] = []
 
 
@@ -104,9 +103,9 @@ def apart(compile_: Callable[[object], object]) -> Callable[[object], object]:
 
 @atexit.register
 def _let_end() -> None:
-    """What is only loaded ends soon, and then meets no interpreter that is half gone."""
+    """It cannot be stopped, and would end badly where Python and LLVM are half gone; what has been made is kept."""
     for thread in tuple(_at_work):
-        thread.join(_PATIENCE)
+        thread.join()
 
 
 def compiled(function: FunctionType, **options: object) -> Any:
