@@ -46,7 +46,12 @@ def loaded() -> ModuleType | None:
 
 def is_ready(kernel: str) -> bool:
     """Whether a kernel has machine code: made by this process, or kept."""
-    return bool(_loaded is not None and getattr(_loaded, kernel).signatures) or machine_code.is_kept(kernel)
+    return is_loaded(kernel) or machine_code.is_kept(kernel)
+
+
+def is_loaded(kernel: str) -> bool:
+    """Whether a kernel can be called at once."""
+    return _loaded is not None and bool(getattr(_loaded, kernel).signatures)
 
 
 def choose(tests: int, loops: int, kernel: str = "") -> ModuleType:

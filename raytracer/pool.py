@@ -32,6 +32,7 @@ from raytracer.arrays import ASKED, BELL, BOARD, SEATS, aligned
 
 _TURNS = 60_000  # a millisecond, about: more than it takes to begin with the next picture
 _NAP = 1e-3  # seconds
+_LONGEST = 10.0  # seconds, if `linger` is being compiled
 _kernels: ModuleType | None = None
 
 Job = TypeVar("Job")
@@ -84,7 +85,8 @@ class _Task:
         while True:
             try:
                 if _kernels is not None:
-                    _kernels.has_ended(self.ended, _TURNS)
+                    with suppress(Exception):  # if it cannot be compiled
+                        _kernels.has_ended(self.ended, _TURNS)
                 while not self._is_over:
                     self._end.get()
                 return interrupted or self._error
@@ -134,7 +136,7 @@ class _Helpers:
         """Let nobody linger any more: a thread that comes back while Python ends finds no interpreter."""
         self.board[BELL] += 1
         for lock in self._lingering:
-            lock.acquire(timeout=1)
+            lock.acquire(timeout=_LONGEST)
 
     def start(self, tasks: list[_Task]) -> None:
         self.make_way()

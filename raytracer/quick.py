@@ -25,8 +25,8 @@ numbers is off by (4.5 + 1.1|x|)u, of which disc has 2.2√T + 0.5 times 1/w, an
 and a pixel with |disc| ≤ 4 · error · m is left to float64. For all others √disc is within 0.27 √(error · m), and k
 within (2.5ρ(√error/4 + 8u) + 24u)k, as it is from 0.7 to 1.301 times zm (the sine of the angle between a ray and the
 middle's is at most ρ): nearer to each other than the sum of both, two spheres are left to float64, too. A factor of
-disc, by whose root r is divided, makes one number of these two limits; whichever is closer to its own is compared. s is
-below 2ac / ((1 − ρ²)(m − ρ²)), which for one m is largest where U = V.
+disc, by whose root r is divided, makes one number of these two limits: the smaller of |disc| and the difference of k is
+compared with it. s is below 2ac / ((1 − ρ²)(m − ρ²)), which for one m is largest where U = V.
 
 **What colour it has.** In pixels, with D = (u, v, −f), the hit is at n = δ + τD from the sphere's middle, where
 δ = (x, y, 0), τ = −(g + √(g² + a(w² − δ²))) / a, g = δ·D, a = D·D. Let s² be the largest a/f² of a pixel of the tile,

@@ -22,6 +22,7 @@ from raytracer.faults import FileError
 from raytracer.methods import CERTIFIED
 from raytracer.mistakes import MOST_SHAPES, recognise
 from raytracer.orbit import pivot_of
+from raytracer.plan import Plan
 from raytracer.plug import Order
 from raytracer.plug_process import PlugRunner
 from raytracer.render import draw, undecided, warm_up
@@ -32,6 +33,7 @@ from sketch.orbit import HOME, Orbit, seen_from
 from sketch.pace import COARSENESS, Pace, enlarged
 
 REST = 0.12  # seconds without a movement until the camera is at rest
+_TO_BE_TOLD = FileError, OSError, MemoryError  # under the picture
 _PATIENCE = 1 / 30  # seconds: between two looks at a picture that grows; for a frame, when the next one is wanted
 
 
@@ -184,7 +186,7 @@ class Renderer:
                 self._compare()
         except Cancelled:
             return
-        except (FileError, OSError, MemoryError) as error:
+        except _TO_BE_TOLD as error:
             message = str(error) or f"{request.path}: not enough memory"
             fault = error if isinstance(error, FileError) else None
             quote = fault.quote() if fault is not None else None
@@ -202,8 +204,9 @@ class Renderer:
             return self._closed or (wanted is not None and (late or not wanted.is_like(request)))
 
         plan = make_plan(scene, request.stage, size, size, method=request.method)
-        if plan.painter and not backend.is_ready(plan.painter):
-            raise Cancelled  # what is at rest waits for that
+        if self._waits_for(plan):
+            self._make_ready(plan, Drawing(request, self._canvas(request.size), scene, moving=True))
+            start = time.perf_counter()
         try:
             picture = enlarged(draw(plan, cancelled=given_up), request.size)
         finally:
@@ -258,11 +261,6 @@ class Renderer:
         start, loaded = looked, backend.loaded()
         plan = make_plan(scene, request.stage, request.size, request.size, method=request.method)
         self.drawing = drawing = replace(drawing, scene=scene, warnings=plan.warnings, path=plan.path_name)
-        if plan.painter and not backend.is_ready(plan.painter):
-            self.drawing = replace(drawing, compiling=True)
-            self._changed()
-            self._make_ready(plan.painter, self.drawing)
-            start = time.perf_counter()
 
         def progress(done: int, total: int, rows: slice) -> None:
             nonlocal looked
@@ -274,6 +272,9 @@ class Renderer:
 
         parts = self._draw_by_plug(drawing) if request.plug else ""
         if not parts:
+            if self._waits_for(plan):
+                self._make_ready(plan, drawing)
+                start = time.perf_counter()
             drawn = draw if request.samples == 1 else partial(draw_samples, samples=request.samples)
             drawn(plan, out=drawing.picture, progress=progress, cancelled=self._superseded)
         elapsed = 1000 * (time.perf_counter() - start)
@@ -282,13 +283,25 @@ class Renderer:
         wrong = _wrong(request, drawing.picture)
         self.drawing = self.whole = replace(drawing, done=1.0, milliseconds=elapsed, wrong=wrong, parts=parts)
 
-    def _make_ready(self, kernel: str, drawing: Drawing) -> None:
-        """Wait for a kernel's machine code, which takes long, and goes on if nobody waits any more."""
-        maker = None
-        while not backend.is_ready(kernel) and (maker is None or maker.is_alive()):
-            if self._maker is None or not self._maker.is_alive():
+    def _waits_for(self, plan: Plan) -> bool:
+        """Whether the plan's kernel has to be compiled; while another one is, it cannot even be loaded."""
+        if not plan.painter or backend.is_loaded(plan.painter):
+            return False
+        return self._is_making or not backend.is_ready(plan.painter)
+
+    @property
+    def _is_making(self) -> bool:
+        return self._maker is not None and self._maker.is_alive()
+
+    def _make_ready(self, plan: Plan, drawing: Drawing) -> None:
+        """Wait for the machine code of the plan's kernel. Compiling takes long; it goes on if nobody waits any more."""
+        maker, self.drawing = None, replace(drawing, compiling=True)
+        self._changed()
+        while self._waits_for(plan) and (maker is None or maker.is_alive()):
+            if not self._is_making:
                 self._maker = maker = threading.Thread(target=self._make, args=(drawing,), name="maker", daemon=True)
                 maker.start()
+            assert self._maker is not None
             self._maker.join(_PATIENCE)
             if self._superseded():
                 raise Cancelled
@@ -296,6 +309,8 @@ class Renderer:
     def _make(self, drawing: Drawing) -> None:
         try:
             bring_in_kernels(drawing)
+        except _TO_BE_TOLD:
+            return  # whoever draws meets it again
         except BaseException as failure:
             self.failure = failure
             self._changed()

@@ -88,14 +88,15 @@ def apart(compile_: Callable[[object], object]) -> Callable[[object], object]:
         made = Future[object]()
 
         def work() -> None:
-            _at_work.append(current_thread())
             try:
                 made.set_result(compile_(signature))
             except BaseException as error:
                 made.set_exception(error)
-            _at_work.remove(current_thread())
+            _at_work.remove(thread)
 
-        Thread(target=work, name="compiler", daemon=True).start()
+        thread = Thread(target=work, name="compiler", daemon=True)
+        _at_work.append(thread)
+        thread.start()
         return made.result()
 
     return compileapart
@@ -103,9 +104,10 @@ def apart(compile_: Callable[[object], object]) -> Callable[[object], object]:
 
 @atexit.register
 def _let_end() -> None:
-    """It cannot be stopped, and would end badly where Python and LLVM are half gone; what has been made is kept."""
+    """Compiling cannot be stopped, and would end badly where Python and LLVM are half gone; what it makes is kept."""
     for thread in tuple(_at_work):
-        thread.join()
+        if thread.is_alive():  # it is not if what interrupted it came before it began
+            thread.join()
 
 
 def compiled(function: FunctionType, **options: object) -> Any:

@@ -147,10 +147,10 @@ def _look(view, bins, at, row, tile, s, listed, tie, paints, sheet):
     m, error, scale, half = 1.0 + u2 + v2, error_of(quick.steep, rho, blur), 1.0, -0.5 * radius
     if certain:
         near = largest(select(listed, near_of(rho, error), 0.0))
-        if near > tie[0]:  # seldom, so nothing waits for it
+        if near > tie[0]:  # a branch that is seldom taken: else all that is drawn would wait for the largest of eight
             tie = near, 1.0 / np.sqrt(near)
-        part = error * over * (4.0 / _LARGEST_K)
-        scale, half = tie[0] / part, half * tie[1] * np.sqrt(part)
+        ratio = error * over * (4.0 / _LARGEST_K)  # of the two limits, but for the tie
+        scale, half = tie[0] / ratio, half * tie[1] * np.sqrt(ratio)
     square, step = blur * blur * scale, pixel * scale
     unfit = ~((depth > NEAREST) & (depth < FARTHEST) & (rho <= 0.25) & (blur < 128.0) & (m < quick.widest))
     middle_x = u * quick.focus + (quick.middle_x - (tile.left + _MIDDLE))

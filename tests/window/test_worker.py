@@ -196,6 +196,7 @@ def test_waiting_for_machine_code_is_told(renderer, scene, monkeypatch):
         pytest.skip("numba is not installed")
     backend.load()
     told = []
+    monkeypatch.setattr(backend, "is_loaded", lambda kernel: False)
     for kept in (True, False):
         monkeypatch.setattr(backend, "is_ready", lambda kernel, kept=kept: kept)
         monkeypatch.setattr(renderer, "_changed", lambda: told.append(renderer.drawing.compiling))
@@ -217,20 +218,54 @@ def test_who_waits_for_machine_code_may_want_something_else(renderer, scene, mon
 
     monkeypatch.setattr(worker, "bring_in_kernels", make_slowly)
     monkeypatch.setattr(backend, "is_ready", lambda kernel: kernel != "paint_normal" or may_end.is_set())
+    monkeypatch.setattr(backend, "is_loaded", lambda kernel: kernel == "paint_flat" or may_end.is_set())
     first = Request(scene, "normal", SIZE)
     for _ in range(2):
         renderer.post(first)
         wait_until(lambda: made and renderer.drawing.request == first and renderer.drawing.compiling)
         answer(renderer, Request(scene, "hit", SIZE))
-    renderer.post(first)
-    wait_until(lambda: renderer.drawing.request == first)
-    renderer.post(turned := replace(first, orbit=Orbit(right=10)))
-    wait_until(lambda: renderer.drawing.request == turned and renderer.drawing.compiling)
+    turned = replace(first, orbit=Orbit(right=10))
+    for waiting in (Request(scene, "diffuse", SIZE), first, turned):  # the first is only not to be loaded meanwhile
+        renderer.post(waiting)
+        wait_until(lambda waiting=waiting: renderer.drawing.request == waiting and renderer.drawing.compiling)
     assert made == ["normal"]
     may_end.set()
-    wait_until(lambda: renderer.drawing.full)
+    wait_until(lambda: renderer.drawing.request == turned and renderer.drawing.full and not renderer.drawing.moving)
     assert np.array_equal(renderer.drawing.picture, draw(make_plan(renderer.drawing.scene, "normal", SIZE, SIZE)))
     assert renderer.failure is None
+
+
+def test_machine_code_that_cannot_be_made_is_no_mistake_of_ours(renderer, scene, monkeypatch):
+    """Whoever draws meets the fault again, if it lasts."""
+    if backend.why_no_compiler():
+        pytest.skip("numba is not installed")
+    backend.load()
+
+    def fail(drawing):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(worker, "bring_in_kernels", fail)
+    monkeypatch.setattr(backend, "is_ready", lambda kernel: False)
+    monkeypatch.setattr(backend, "is_loaded", lambda kernel: False)
+    drawing = answer(renderer, Request(scene, "hit", SIZE))
+    assert renderer.failure is None
+    assert np.array_equal(drawing.picture, render_scene(interpreter(scene), "hit", SIZE, SIZE))
+
+
+def test_a_plugged_file_waits_for_no_machine_code(scene, monkeypatch):
+    if backend.why_no_compiler():
+        pytest.skip("numba is not installed")
+    backend.load()
+    monkeypatch.setattr(backend, "is_ready", lambda kernel: False)
+    monkeypatch.setattr(backend, "is_loaded", lambda kernel: False)
+    picture = np.full((SIZE, SIZE, 3), 9, np.uint8)
+    plug = SimpleNamespace(path=Path("own.py"), draw=lambda *_: (picture, ["a part"], []), close=lambda: None)
+    told = []
+    renderer = Renderer(lambda: told.append(renderer.drawing.compiling), plug)
+    drawing = answer(renderer, Request(scene, "diffuse", SIZE, plug=1))
+    renderer.close()
+    assert (drawing.picture == picture).all()
+    assert not any(told)
 
 
 def test_machine_code_that_cannot_be_kept_is_waited_for_once(renderer, scene, monkeypatch):
