@@ -162,7 +162,7 @@ def test_what_makes_it_faster_is_loaded_once_and_in_the_background(renderer, sce
         loads.append(threading.current_thread())
         assert may_end.wait(10)
 
-    stand_in = SimpleNamespace(load=load_slowly, loaded=lambda: None, is_ready=backend.is_ready)
+    stand_in = SimpleNamespace(**vars(backend) | {"load": load_slowly, "loaded": lambda: None})
     monkeypatch.setattr(worker, "backend", stand_in)
     monkeypatch.setattr(worker, "bring_in_kernels", lambda seen: True)
     renderer.get_faster()  # too early
