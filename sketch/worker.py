@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -143,17 +144,20 @@ class Renderer:
         self._thread.join(timeout)
 
     def _work(self) -> None:
-        try:
+        with self._reporting():
             while (request := self._next()) is not None:
                 self._answer(request)
-        except BaseException as failure:
-            self.failure = failure
-            self._changed()
 
     def _load(self) -> None:
-        try:
+        with self._reporting():
             if self.whole is not None and bring_in_kernels(self.whole):
                 backend.load()
+
+    @contextmanager
+    def _reporting(self) -> Iterator[None]:
+        """An exception on a thread of ours is a failure."""
+        try:
+            yield
         except BaseException as failure:
             self.failure = failure
             self._changed()
@@ -307,13 +311,8 @@ class Renderer:
                 raise Cancelled
 
     def _make(self, drawing: Drawing) -> None:
-        try:
+        with self._reporting(), suppress(*_TO_BE_TOLD):  # which whoever draws meets again
             bring_in_kernels(drawing)
-        except _TO_BE_TOLD:
-            return  # whoever draws meets it again
-        except BaseException as failure:
-            self.failure = failure
-            self._changed()
 
     def _draw_by_plug(self, drawing: Drawing) -> str:
         """Have the plugged file draw; which of its parts did, or nothing if it has none in this picture."""

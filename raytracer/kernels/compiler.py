@@ -82,7 +82,7 @@ def apart(compile_: Callable[[object], object]) -> Callable[[object], object]:
     """
 
     @wraps(compile_)
-    def compileapart(signature: object) -> object:
+    def compile_apart(signature: object) -> object:
         if current_thread() is not main_thread():
             return compile_(signature)
         made = Future[object]()
@@ -99,7 +99,7 @@ def apart(compile_: Callable[[object], object]) -> Callable[[object], object]:
         thread.start()
         return made.result()
 
-    return compileapart
+    return compile_apart
 
 
 @atexit.register

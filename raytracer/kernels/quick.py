@@ -118,7 +118,7 @@ def _draw_all(view, bins, first, end, tile, paints, sheet):
         count, row = min(WIDTH, end - at), np.uint64(at - first)
         listed = mask_of((1 << count) - 1)
         unfit, tie, blur, radius, depth = look(view, bins, np.uint64(at), row, tile, s, listed, tie, paints, sheet)
-        if bits_of(unfit) & ((1 << count) - 1):
+        if any_of(unfit & listed):
             return False, extremes
         extremes = widened(extremes, listed, blur, radius, depth)
         for j in range(np.uint64(0), np.uint64(count)):

@@ -23,6 +23,7 @@ from sketch.worker import Drawing, Renderer, Request
 
 SPHERE = "surface 1 0 0  0 0 0  0 0 0  1 0\nlight 0 5 5  1 1 1\nsphere 1 0 0 -4\n"
 SIZE = 50
+compiled = pytest.mark.skipif(backend.why_no_compiler() != "", reason="numba is not installed")
 FAR = Path(__file__).resolve().parent.parent.parent / "scenes" / "hard" / "01_far_small_sphere.cli"
 
 
@@ -179,7 +180,7 @@ def test_what_makes_it_faster_is_loaded_once_and_in_the_background(renderer, sce
     assert renderer.failure is None
 
 
-@pytest.mark.skipif(backend.why_no_compiler() != "", reason="numba is not installed")
+@compiled
 def test_the_kernels_that_are_brought_in_are_used_next(renderer, scene):
     answer(renderer, Request(scene, "error", SIZE, "half_b"))
     renderer.get_faster()
@@ -191,9 +192,8 @@ def test_the_kernels_that_are_brought_in_are_used_next(renderer, scene):
     assert backend.load() is import_module("raytracer.kernels")
 
 
+@compiled
 def test_waiting_for_machine_code_is_told(renderer, scene, monkeypatch):
-    if backend.why_no_compiler():
-        pytest.skip("numba is not installed")
     backend.load()
     told = []
     monkeypatch.setattr(backend, "is_loaded", lambda kernel: False)
@@ -205,10 +205,9 @@ def test_waiting_for_machine_code_is_told(renderer, scene, monkeypatch):
         assert any(told) != kept
 
 
+@compiled
 def test_who_waits_for_machine_code_may_want_something_else(renderer, scene, monkeypatch):
     """The next picture does not wait, nor does a frame; what has been begun is not begun again."""
-    if backend.why_no_compiler():
-        pytest.skip("numba is not installed")
     backend.load()
     made, may_end = [], threading.Event()
 
@@ -235,10 +234,9 @@ def test_who_waits_for_machine_code_may_want_something_else(renderer, scene, mon
     assert renderer.failure is None
 
 
+@compiled
 def test_machine_code_that_cannot_be_made_is_no_mistake_of_ours(renderer, scene, monkeypatch):
     """Whoever draws meets the fault again, if it lasts."""
-    if backend.why_no_compiler():
-        pytest.skip("numba is not installed")
     backend.load()
 
     def fail(drawing):
@@ -252,9 +250,8 @@ def test_machine_code_that_cannot_be_made_is_no_mistake_of_ours(renderer, scene,
     assert np.array_equal(drawing.picture, render_scene(interpreter(scene), "hit", SIZE, SIZE))
 
 
+@compiled
 def test_a_plugged_file_waits_for_no_machine_code(scene, monkeypatch):
-    if backend.why_no_compiler():
-        pytest.skip("numba is not installed")
     backend.load()
     monkeypatch.setattr(backend, "is_ready", lambda kernel: False)
     monkeypatch.setattr(backend, "is_loaded", lambda kernel: False)
@@ -268,9 +265,8 @@ def test_a_plugged_file_waits_for_no_machine_code(scene, monkeypatch):
     assert not any(told)
 
 
+@compiled
 def test_machine_code_that_cannot_be_kept_is_waited_for_once(renderer, scene, monkeypatch):
-    if backend.why_no_compiler():
-        pytest.skip("numba is not installed")
     backend.load()
     monkeypatch.setattr(machine_code, "is_kept", lambda kernel: False)
     answer(renderer, Request(scene, "hit", SIZE))
