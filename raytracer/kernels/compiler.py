@@ -16,7 +16,7 @@ from concurrent.futures import Future
 from contextlib import contextmanager
 from functools import partial, wraps
 from importlib import import_module
-from threading import Thread, current_thread, main_thread
+from threading import Lock, Thread, current_thread, main_thread
 from types import FunctionType, ModuleType
 from typing import Any
 
@@ -72,6 +72,7 @@ for _name in machine_code.SOURCES:
 
 _CACHE = machine_code.folder()
 _at_work: list[Thread] = []
+_LOOK_UP = 0.1  # seconds; what comes just before a wait, or to another thread, does not wake whom Python tells of it
 
 
 def apart(compile_: Callable[[object], object]) -> Callable[[object], object]:
@@ -85,7 +86,8 @@ def apart(compile_: Callable[[object], object]) -> Callable[[object], object]:
     def compile_apart(signature: object) -> object:
         if current_thread() is not main_thread():
             return compile_(signature)
-        made = Future[object]()
+        made, ended = Future[object](), Lock()
+        ended.acquire()  # a lock alone: an exception that a signal raises in a Future's wait may leave that locked
 
         def work() -> None:
             try:
@@ -93,10 +95,13 @@ def apart(compile_: Callable[[object], object]) -> Callable[[object], object]:
             except BaseException as error:
                 made.set_exception(error)
             _at_work.remove(thread)
+            ended.release()
 
         thread = Thread(target=work, name="compiler", daemon=True)
         _at_work.append(thread)
         thread.start()
+        while not ended.acquire(timeout=_LOOK_UP):
+            pass
         return made.result()
 
     return compile_apart
