@@ -360,6 +360,11 @@ class QuickScratch(NamedTuple):
     late_columns: np.ndarray  # int32: those; and at the end, some that `kernels.doubts` has decided
     late_rows: np.ndarray  # int32
     spheres: np.ndarray  # int32, what they show
+    slopes: (
+        np.ndarray
+    )  # float64, flat: hu, its rest, hv, its rest of each of the tile's list, see `fine`; the first free
+    sides: np.ndarray  # float64, flat: hw, its rest, c, its rest
+    ids: np.ndarray  # int32, the numbers of those spheres; the first is −1
 
 
 class Quick(NamedTuple):
@@ -432,15 +437,11 @@ class FullPaints(NamedTuple):
 
 
 class FineRays(NamedTuple):
-    """What the directions of a picture need for twice the digits: see `certified.fine_direction`."""
+    """What the directions of a picture need for twice the digits: see `fine`."""
 
+    quick: Quick
     across_low: np.ndarray  # the rest of U, eight elements to spare
-    x: np.ndarray  # V·v − d·w, its components and their rests, (height,)
-    x_low: np.ndarray
-    y: np.ndarray
-    y_low: np.ndarray
-    z: np.ndarray
-    z_low: np.ndarray
+    up_low: np.ndarray  # the rest of V
 
 
 class Canvas(NamedTuple):
@@ -457,7 +458,8 @@ class Canvas(NamedTuple):
 class HitRows(NamedTuple):
     """Hits of some rows of a picture, flat."""
 
-    t: np.ndarray
+    t: np.ndarray  # (0,) where only the index is wanted
     index: np.ndarray  # type: ignore[assignment]
     first_row: int
     width: int
+    is_left: np.ndarray  # int64 (1,): 1 once some t is not a number, as its last digit is not certain

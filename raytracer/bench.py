@@ -396,18 +396,24 @@ def _unchecked(scene: Scene, size: Size) -> peers.Draw | None:
 
 def hits(effort: Effort, seed: int, progress: Progress) -> Iterator[Section | Check]:
     """What each pixel hits, without a picture."""
-    progress("eye_hits")
-    scene = spread(effort.middle, seed)
-    views = [replace(scene, camera=camera) for camera in cameras(scene)]
+    rows = []
+    for n in effort.spheres:
+        progress(f"eye_hits, {n:,} spheres")
+        scene = spread(n, seed)
+        views = [replace(scene, camera=camera) for camera in cameras(scene)]
+        lanes = {"eye_hits": _hits_lane(views, effort.size)}
+        timings = interleaved(lanes, effort.rounds, effort.seconds)
+        rows += rows_of(timings, n, effort.size, pixels(effort.size))
+    title = f"Hits: t to the last digit and index, {named(effort.size)}"
+    yield Section("hits", title, "ray", "", "", tuple(rows))
 
+
+def _hits_lane(views: list[Scene], size: Size) -> Callable[[int], tuple[float, float]]:
     def lane(turn: int) -> tuple[float, float]:
-        seconds, _ = clocked(partial(eye_hits, views[turn % len(views)], *effort.size))
+        seconds, _ = clocked(partial(eye_hits, views[turn % len(views)], *size))
         return seconds, seconds
 
-    timings = interleaved({"eye_hits": lane}, effort.rounds, effort.seconds)
-    rows = rows_of(timings, effort.middle, effort.size, pixels(effort.size))
-    title = f"Hits: t to the last digit and index, {effort.middle:,} spheres, {named(effort.size)}"
-    yield Section("hits", title, "ray", "", "", tuple(rows))
+    return lane
 
 
 def any_rays(effort: Effort, seed: int, progress: Progress) -> Iterator[Section | Check]:

@@ -17,7 +17,8 @@ from tempfile import gettempdir
 
 _HERE = Path(__file__).parent
 SOURCES = (  # what kernels call into; `kernels.compiler` compiles these, and no others
-    "alike", "arrays", "bounce", "boxes", "camera", "certified", "facets", "methods", "quick", "shading", "twofold",
+    "alike", "arrays", "bounce", "boxes", "camera", "certified", "facets", "fine", "methods", "quick", "shading",
+    "twofold",
 )  # fmt: skip
 
 

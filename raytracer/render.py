@@ -13,9 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from raytracer import backend
-from raytracer.arrays import Canvas, FullPaints, Hits, Paints, Tiles
+from raytracer.arrays import Canvas, FullPaints, Hits, Paints, Tiles, aligned
 from raytracer.eye import Eye, count_tests
-from raytracer.image import Depth
 from raytracer.methods import CERTIFIED, Method
 from raytracer.notebook import Picture
 from raytracer.plan import Plan, make_plan
@@ -77,7 +76,7 @@ def draw(
 ) -> np.ndarray:
     """`render_scene` for whoever has made the plan already."""
     shape = plan.raster.height, plan.raster.width, 3
-    picture = np.empty(shape, plan.depth.kind) if out is None else fitting(out, shape, plan.depth)
+    picture = np.empty(shape, plan.depth.kind) if out is None else fitting(out, shape, plan.depth.kind)
     canvas = make_canvas(picture) if plan.painter else None
     if plan.painter and canvas is None:
         picture[...] = draw(plan, threads=threads, progress=progress, cancelled=cancelled)
@@ -150,15 +149,42 @@ def share_pieces(bands: list[slice], watch: Watch, work: Callable[[slice, int], 
 
 def _paint(easel: Easel, watch: Watch) -> None:
     """A stage that a kernel paints; numpy paints the pixels that kernels were not certain of."""
-    screen, moments = easel.screen, easel.screen.moments(easel.plan.shading)
-    bands, call, everyone = screen.pieces(moments), together(screen.workers(moments)), range(screen.threads)
+
+    def paint(rows: slice, call: Call) -> slice:
+        easel.paint(easel.screen.tiles_of(rows), call=call)
+        return rows
+
+    _paint_together(easel.plan, easel.screen, watch, paint, easel.finish)
+
+
+def _paint_together(
+    plan: Plan, screen: Screen, watch: Watch, work: Callable[[slice, Call], slice], finish: Callable[..., None]
+) -> None:
+    """Have all threads at work on the same rows, one piece of the picture after the other.
+
+    Work returns the rows of the picture that it has finished, and calls kernels by what it is given. What it leaves to
+    be decided, finish(*workers) decides.
+    """
+    moments, everyone = screen.moments(plan.shading), range(screen.threads)
+    bands, call = screen.pieces(moments), together(screen.workers(moments))
     for rows in bands:
         watch.check()
-        easel.paint(screen.tiles_of(rows), call=call)
+        done = work(rows, call)
         if len(bands) > 1 and screen.is_crowded:
-            easel.finish(*everyone)
-        watch.tell(len(bands), rows)
-    easel.finish(*everyone)
+            finish(*everyone)
+        watch.tell(len(bands), done)
+    finish(*everyone)
+
+
+def _hunt(plan: Plan, screen: Screen, watch: Watch, hits: Hits, kind: str) -> None:
+    """Find the hits of a whole picture, as `Screen.hunt` says."""
+    hunt = screen.hunt(hits, kind)
+
+    def find(rows: slice, call: Call) -> slice:
+        hunt.find(rows, call=call)
+        return slice(rows.start, rows.start)
+
+    _paint_together(plan, screen, watch, find, hunt.settle)
 
 
 @dataclass
@@ -203,23 +229,19 @@ def paints_of(plan: Plan, screen: Screen) -> Paints | FullPaints:
 @np.errstate(all="ignore")
 def _paint_whole(plan: Plan, screen: Screen, canvas: Canvas, watch: Watch) -> None:
     """A stage that a kernel paints from the hits of the whole picture."""
-    paints, hits = make_paints(plan, screen), screen.room_for_hits()
-    width, shape = plan.raster.width, (plan.raster.height, plan.raster.width)
-    t, index = (array[:-SPARE].reshape(shape) for array in hits)
-
-    def find(rows: slice, worker: int) -> slice:
-        screen.find(Hits(t, index), 0, rows, worker)
-        return slice(rows.start, rows.start)
+    width, shape, has_t = plan.raster.width, (plan.raster.height, plan.raster.width), plan.stage.needs_range
+    paints, hits = make_paints(plan, screen), screen.room_for_hits(has_t)
+    t, index = hits.t[:-SPARE].reshape(shape if has_t else 0), hits.index[:-SPARE].reshape(shape)
 
     def paint(rows: slice, worker: int) -> slice:
         painter(*hits, near, far, rows.start, rows.stop, width, screen.desks, worker, paints, canvas)
         return rows
 
-    share_bands(screen, plan, watch, find)
-    screen.settle(Hits(t, index), 0, *range(screen.threads))
+    _hunt(plan, screen, watch, Hits(t, index), "" if has_t else "shapes")
     if screen.unit:
         np.ldexp(t, screen.unit, out=t)  # in the scene's own unit some may be too small or too large for a float64
-    painter, (near, far) = getattr(plan.path, plan.painter), plan.reach or screen.range_of(t, index)
+    painter = getattr(plan.path, plan.painter)
+    near, far = plan.reach or (screen.range_of(t, index) if has_t else (0.0, 0.0))
     share_bands(screen, plan, watch, paint)
 
 
@@ -256,22 +278,27 @@ def whole_of(plan: Plan, tracer: Eye | Screen, watch: Watch | None = None) -> Wh
     return Whole(hits_of(plan, tracer, watch), reach=plan.reach) if plan.stage.needs_whole else None
 
 
-def hits_of(plan: Plan, tracer: Eye | Screen, watch: Watch | None = None, polished: bool = False) -> Hits:
+def hits_of(
+    plan: Plan, tracer: Eye | Screen, watch: Watch | None = None, polished: bool = False, out: Hits | None = None
+) -> Hits:
     """The hits of the whole picture."""
-    hits = _no_hits(slice(0, plan.raster.height), plan.raster.width)
+    hits = _no_hits(slice(0, plan.raster.height), plan.raster.width) if out is None else out
 
     def trace(rows: slice, worker: int) -> slice:
-        if isinstance(tracer, Screen):
-            tracer.find(hits, 0, rows, worker, polished)
-        else:
-            hits.t[rows], hits.index[rows] = tracer.hits(rows, worker, polished)
+        hits.t[rows], hits.index[rows] = tracer.hits(rows, worker, polished)
         return slice(rows.start, rows.start)
 
-    share_bands(tracer, plan, watch or Watch(), trace)
-    if isinstance(tracer, Screen):
-        tracer.settle(hits, 0, *range(tracer.threads), polished=polished)
-        return tracer.in_scene(hits)
-    return hits
+    if not isinstance(tracer, Screen):
+        share_bands(tracer, plan, watch or Watch(), trace)
+        return hits
+    _hunt(plan, tracer, watch or Watch(), hits, "fine" if polished else "")
+    found = tracer.in_scene(hits)
+    if out is None:
+        return found
+    for array, new in zip(out, found, strict=True):
+        if new is not array:
+            array[...] = new
+    return out
 
 
 def eye_hits(
@@ -282,17 +309,28 @@ def eye_hits(
     sampling: str = "corner",
     method: str | Method = CERTIFIED,
     threads: int | None = None,
+    out: Hits | None = None,
 ) -> Hits:
     """What each pixel's eye ray hits first: t (float64, +inf for a miss) and index (int32, −1), both (height, width).
 
-    ValueError for a size, sampling or method that there is not, `PictureTooLargeError` before a ray is shot.
-
     index is the shape's place among all shapes of the file; `scene.shape(index)` is the shape. t counts multiples of
     the ray's direction, which is not normalised.
+
+    `out` are two such arrays, one row behind the other, to be written into. ValueError for those that are not, and for
+    a size, sampling or method that there is not, `PictureTooLargeError` before a ray is shot.
     """
     plan = make_plan(scene, "hit", width, height, sampling, method)
+    if out is not None:
+        _check_hits(out, (height, width))
     with open_tracer(plan, threads) as tracer:
-        return hits_of(plan, tracer, Watch(threads), polished=True)
+        return hits_of(plan, tracer, Watch(threads), polished=True, out=out)
+
+
+def _check_hits(out: Hits, shape: tuple[int, int]) -> None:
+    for name, array, kind in zip(Hits._fields, out, (np.float64, np.int32), strict=True):
+        fitting(array, shape, kind, f"out.{name}")
+        if not array.flags.c_contiguous:
+            raise ValueError(f"out.{name}: found rows that lie apart, expected one behind the other")
 
 
 def undecided(scene: Scene, width: int, height: int, sampling: str = "corner") -> np.ndarray:
@@ -324,11 +362,12 @@ def _twins(camera: Camera) -> Scene:
 
 def _no_hits(rows: slice, width: int) -> Hits:
     shape = (rows.stop - rows.start, width)
-    return Hits(np.empty(shape), np.empty(shape, np.int32))
+    size = shape[0] * shape[1]
+    return Hits(aligned(size, np.float64).reshape(shape), aligned(size, np.int32).reshape(shape))
 
 
-def fitting(out: np.ndarray, shape: tuple[int, ...], depth: Depth = Depth.BYTE) -> np.ndarray:
-    if not isinstance(out, np.ndarray) or out.shape != shape or out.dtype != depth.kind:
+def fitting(out: np.ndarray, shape: tuple[int, ...], kind: type = np.uint8, name: str = "out") -> np.ndarray:
+    if not isinstance(out, np.ndarray) or out.shape != shape or out.dtype != kind:
         found = f"{out.dtype} {out.shape}" if isinstance(out, np.ndarray) else type(out).__name__
-        raise ValueError(f"out: found {found}, expected {np.dtype(depth.kind)} {shape}")
+        raise ValueError(f"{name}: found {found}, expected {np.dtype(kind)} {shape}")
     return out

@@ -81,7 +81,7 @@ def draw_samples(
         picture = draw(plan, threads=threads, out=out, cancelled=cancelled)
         wanted = differing(picture, plan.depth)
     else:
-        picture = np.empty(size, plan.depth.kind) if out is None else fitting(out, size, plan.depth)
+        picture = np.empty(size, plan.depth.kind) if out is None else fitting(out, size, plan.depth.kind)
         wanted = np.ones(size[:2], bool)
     _draw_means(fine, side, wanted, picture, Watch(threads, progress, cancelled))
     return picture

@@ -50,7 +50,7 @@ from raytracer.arrays import (
     aligned,
 )
 from raytracer.boxes import Lens, make_lens
-from raytracer.camera import Raster, columns_and_rows, fine_columns, fine_rows, grid_of
+from raytracer.camera import Raster, columns_and_rows, fine_columns_and_rows, grid_of
 from raytracer.eye import bundle_of, usable_spread
 from raytracer.facets import exact_volume
 from raytracer.full import surfaces_of, terms_of
@@ -176,37 +176,26 @@ class Screen(NamedTuple):
     def hits(self, rows: slice, worker: int = 0, polished: bool = False) -> Hits:
         """What the rays of these rows, cut between tiles, hit first: as `Eye.hits`."""
         shape = rows.stop - rows.start, self.raster.width
-        hits = Hits(np.empty(shape), np.empty(shape, np.int32))
-        self.find(hits, rows.start, rows, worker, polished)
-        self.settle(hits, rows.start, worker, polished=polished)
-        return self.in_scene(hits)
+        hunt = self.hunt(Hits(np.empty(shape), np.empty(shape, np.int32)), "fine" if polished else "", rows.start)
+        hunt.find(rows, worker)
+        hunt.settle(worker)
+        return self.in_scene(hunt.hits)
 
     @_NOT_A_NUMBER_IS_NO_ERROR
-    def find(self, hits: Hits, first_row: int, rows: slice, worker: int, polished: bool = False) -> None:
-        """`hits` of some rows, in units, and with numbers of spheres; what is left to do, `settle` does.
+    def hunt(self, hits: Hits, kind: str = "", first_row: int = 0) -> Hunt:
+        """Look for `hits` of rows from first_row on, in units, and with numbers of spheres.
 
-        The arrays begin with first_row, and hold all rows that this worker is given until it settles.
+        `kind` says what is wanted: t good enough to be shaded; "fine": to the last digit; "shapes": only the index.
         """
-        out = HitRows(hits.t.reshape(-1), hits.index.reshape(-1), first_row, self.raster.width)
-        kernel, paints = ("find_fine_hits", self._fine_rays()) if polished else ("find_hits", _NO_PAINTS)
-        for doubtful in self.paint(kernel, self.tiles_of(rows), paints, out, worker):
-            doubtful.decide(hits, first_row)
+        kernel, paints = _HUNTS[kind], _NO_PAINTS if kind == "" else self._fine_rays()
+        flat = HitRows(hits.t.reshape(-1), hits.index.reshape(-1), first_row, self.raster.width, np.zeros(1, np.int64))
+        return Hunt(self, hits, flat, kernel, paints)
 
-    @_NOT_A_NUMBER_IS_NO_ERROR
-    def settle(self, hits: Hits, first_row: int, *workers: int, polished: bool = False) -> None:
-        """Decide what these workers have listed as doubtful, and polish t where that is still to be done."""
-        for doubtful in self.doubtful(*workers):
-            doubtful.decide(hits, first_row)
-        if polished and np.isnan(hits.t).any():
-            ys, xs = np.nonzero(np.isnan(hits.t))
-            some = Hits(hits.t[ys, xs], hits.index[ys, xs])
-            polish(some, (np.arange(len(xs)),), Pixels(self, xs, ys + first_row), self.targets)
-            hits.t[ys, xs] = some.t
-
-    def room_for_hits(self) -> Hits:
-        """Flat arrays for the hits of all pixels, and some elements to spare."""
+    def room_for_hits(self, has_t: bool) -> Hits:
+        """Flat arrays for the hits of all pixels, and some elements to spare; without t, that is empty."""
         size = self.raster.height * self.raster.width + SPARE
-        return Hits(self.workspace.array(size, np.float64, "t"), self.workspace.array(size, np.int32, "hit"))
+        t = self.workspace.array(size if has_t else 0, np.float64, "t")
+        return Hits(t, self.workspace.array(size, np.int32, "hit"))
 
     def range_of(self, t: np.ndarray, index: np.ndarray) -> tuple[float, float]:
         """The smallest and the largest t of all hits."""
@@ -214,9 +203,7 @@ class Screen(NamedTuple):
         return near, far
 
     def _fine_rays(self) -> FineRays:
-        _, low = fine_columns(self.raster)
-        x, y, z = fine_rows(self.raster)
-        return FineRays(np.concatenate([low, np.zeros(SPARE)]), *x, *y, *z)
+        return _fine_rays(self.raster, self.unit)
 
     @_NOT_A_NUMBER_IS_NO_ERROR
     def in_scene(self, hits: Hits) -> Hits:
@@ -273,6 +260,38 @@ class Screen(NamedTuple):
         yield Pixels(self, xs, ys)
 
 
+_HUNTS = {"": "find_hits", "fine": "find_fine_hits", "shapes": "find_shapes"}
+
+
+class Hunt(NamedTuple):
+    """The hits of a screen, or of some of its rows, while a kernel looks for them."""
+
+    screen: Screen
+    hits: Hits  # (rows, width); of t there may be nothing
+    flat: HitRows  # the same
+    kernel: str
+    paints: Paints | FineRays
+
+    @_NOT_A_NUMBER_IS_NO_ERROR
+    def find(self, rows: slice, worker: int = 0, call: Call = alone) -> None:
+        """Look for what these rows hit; what is left to do, `settle` does."""
+        tiles = self.screen.tiles_of(rows)
+        for doubtful in self.screen.paint(self.kernel, tiles, self.paints, self.flat, worker, call):
+            doubtful.decide(self.hits, self.flat.first_row)
+
+    @_NOT_A_NUMBER_IS_NO_ERROR
+    def settle(self, *workers: int) -> None:
+        """Decide what these workers have listed as doubtful, and polish t where that is still to be done."""
+        for doubtful in self.screen.doubtful(*workers):
+            doubtful.decide(self.hits, self.flat.first_row)
+        if self.flat.is_left[0]:
+            self.flat.is_left[0], t = 0, self.hits.t
+            ys, xs = np.nonzero(np.isnan(t))
+            some, pixels = Hits(t[ys, xs], self.hits.index[ys, xs]), Pixels(self.screen, xs, ys + self.flat.first_row)
+            polish(some, (np.arange(len(xs)),), pixels, self.screen.targets)
+            t[ys, xs] = some.t
+
+
 class Pixels(NamedTuple):
     """Some pixels of a screen, to be decided by the levels above float64."""
 
@@ -287,8 +306,10 @@ class Pixels(NamedTuple):
 
     def decide(self, hits: Hits, first_row: int) -> None:
         """Put what they hit into the hits of the rows from first_row on."""
-        where = self.ys - first_row, self.xs
-        hits.t[where], hits.index[where] = self.hits()
+        where, found = (self.ys - first_row, self.xs), self.hits()
+        hits.index[where] = found.index
+        if hits.t.size:
+            hits.t[where] = found.t
 
     def bundle(self, which: Index) -> Bundle:
         screen = self.screen
@@ -373,6 +394,19 @@ def _glass(scene: Scene, screen: Screen) -> Mirrors:
     return see_mirrors(
         make_lens(screen.raster), screen.view.eye, balls, corners, scene.triangles, screen.unit, shown, screen.kernels
     )
+
+
+def _fine_rays(raster: Raster, unit: int) -> FineRays:
+    black = 0.0, 0.0, 0.0
+    quick, *_ = _make_paints(raster, (), unit, (0.0, 0.0), black, black)
+    return FineRays(quick, *_spare_rests(raster.of_any_camera))
+
+
+@lru_cache(maxsize=8)
+def _spare_rests(raster: Raster) -> tuple[np.ndarray, np.ndarray]:
+    """With eight columns to spare."""
+    across, up = fine_columns_and_rows(raster)
+    return np.append(across, np.zeros(SPARE)), up
 
 
 _AXIS = 0.0, 0.0, 0.0

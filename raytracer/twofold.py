@@ -65,6 +65,11 @@ def dekker_product(a: Number, b: Number) -> Twofold:
     return product, a_low * b_low - (((product - a_high * b_high) - a_low * b_high) - a_high * b_low)
 
 
+def times_plus(a: Number, b: Number, c: Number) -> Number:
+    """a · b + c, rounded once or twice: for rests, of which the last digit does not matter."""
+    return a * b + c
+
+
 def add(a: Number, a_low: Number, b: Number, b_low: Number) -> Twofold:
     """a + b, relative error at most 3u² (AccurateDWPlusDW)."""
     high, error = two_sum(a, b)

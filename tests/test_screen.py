@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from raytracer import STAGES, backend, eye_hits, interpreter, make_plan, plain, render_scene, screen
-from raytracer.arrays import Records
+from raytracer import STAGES, backend, exact, eye_hits, interpreter, make_plan, plain, render_scene, screen
+from raytracer.arrays import Hits, Records
 from raytracer.bench import spread
 from raytracer.boxes import make_lens
 from raytracer.camera import make_raster
@@ -63,6 +63,72 @@ def test_both_paths_find_the_same_hits_among_spheres_all_around(seed):
     np.testing.assert_array_equal(found[0].index, found[1].index)
     np.testing.assert_array_equal(found[0].t, found[1].t)
     np.testing.assert_array_equal(drawn(scene, "diffuse", 90, 70, KERNELS), drawn(scene, "diffuse", 90, 70, plain))
+
+
+def distances(count, seed):
+    """Rays of a picture of 120 × 90 pixels, and of each a sphere that it grazes: no two of them overlap.
+
+    The line of the ray is that part of the radius from the rim whose root is beyond what float64 is certain of.
+    """
+    rng, raster = np.random.default_rng(seed), make_raster(Camera(), 120, 90)
+    pixels = rng.permutation(30 * 22)[:count]
+    xs, ys = pixels % 30 * 4 + 2, pixels // 30 * 4 + 2
+    steps = [raster.whole_direction(int(x), int(y)) for x, y in zip(xs, ys, strict=True)]
+    ahead = np.array([[part / unit for part in whole] for whole, unit in steps])
+    ahead *= (rng.uniform(5, 20, count) / np.linalg.norm(ahead, axis=1))[:, None]
+    aside = np.cross(ahead, rng.normal(size=(count, 3)))
+    aside /= np.linalg.norm(aside, axis=1)[:, None]
+    radii = np.linalg.norm(ahead, axis=1) * rng.uniform(0.002, 0.004, count)
+    cosines = 10.0 ** rng.uniform(-4, -2, count)
+    centres = ahead + aside * (radii * np.sqrt(1 - cosines**2))[:, None]
+    return xs, ys, centres, radii
+
+
+def test_the_last_digit_is_exact_also_where_a_ray_grazes_a_small_sphere():
+    xs, ys, centres, radii = distances(300, seed=1)
+    order = np.arange(len(radii), dtype=np.int32)
+    material = np.zeros(len(radii), np.int32)
+    scene = replace(interpret(SURFACE), spheres=Spheres(radii, centres, material, order))
+    hits, raster = eye_hits(scene, 120, 90), make_raster(scene.camera, 120, 90)
+    for k, (x, y) in enumerate(zip(xs.tolist(), ys.tolist(), strict=True)):
+        numbers = [*scene.camera.eye, *centres[k].tolist(), float(radii[k])]
+        t, _ = exact.nearest_of(numbers, *raster.whole_direction(x, y))
+        assert hits.index[y, x] == k
+        assert abs(hits.t[y, x] - t) <= np.spacing(t)
+
+
+def test_both_paths_find_the_same_hits_among_small_spheres():
+    scene = spread(2000, seed=5)
+    for size in ((203, 131), (64, 32), (9, 33)):
+        found = []
+        for path in (KERNELS, plain):
+            plan = make_plan(scene, "hit", *size, path=path)
+            with open_tracer(plan) as tracer:
+                found.append(hits_of(plan, tracer, polished=True))
+        np.testing.assert_array_equal(found[0].index, found[1].index)
+        np.testing.assert_array_equal(found[0].t, found[1].t)
+
+
+@pytest.mark.parametrize("name", ["04_many_spheres", "06_icosahedron_and_sphere", "hard/03_eye_inside_a_sphere"])
+def test_hits_may_be_written_into_given_arrays(name):
+    scene = interpreter(f"scenes/{name}.cli")
+    expected, out = eye_hits(scene, 70, 50), Hits(np.zeros((50, 70)), np.zeros((50, 70), np.int32))
+    assert eye_hits(scene, 70, 50, out=out) is out
+    for found, array in zip(out, expected, strict=True):
+        np.testing.assert_array_equal(found, array)
+
+
+@pytest.mark.parametrize(
+    ("t", "index", "message"),
+    [
+        (np.zeros((5, 6)), np.zeros((6, 5), np.int32), r"out.index: found int32 \(6, 5\), expected int32 \(5, 6\)"),
+        (np.zeros((5, 6), np.float32), np.zeros((5, 6), np.int32), r"out.t: found float32 .*, expected float64"),
+        (np.zeros((5, 7))[:, :6], np.zeros((5, 6), np.int32), "out.t: found rows that lie apart"),
+    ],
+)
+def test_arrays_that_hits_cannot_be_written_into(t, index, message):
+    with pytest.raises(ValueError, match=message):
+        eye_hits(Scene(), 6, 5, out=Hits(t, index))
 
 
 def test_the_picture_does_not_depend_on_threads():

@@ -44,6 +44,10 @@ if PROCESSOR.get("fma"):  # else a fused operation is a slow call, and not on ev
 
         return product_and_error
 
+    @overload(twofold.times_plus)
+    def _times_plus(a, b, c):
+        return lambda a, b, c: fused(a, b, c)
+
 
 @overload(twofold.exponent)
 def _exponent(x):
@@ -65,7 +69,7 @@ def _compile_calls_into(module: ModuleType) -> None:
 
 _OVERLOADED = (twofold.select, twofold.exponent, twofold.scale)
 if PROCESSOR.get("fma"):
-    _OVERLOADED += (twofold.two_product,)
+    _OVERLOADED += (twofold.two_product, twofold.times_plus)
 for _name in machine_code.SOURCES:
     _compile_calls_into(import_module(f"raytracer.{_name}"))
 

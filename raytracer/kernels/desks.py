@@ -51,6 +51,9 @@ _ARRAYS = {
         "late_columns": (np.int32, _LATE),
         "late_rows": (np.int32, _LATE),
         "spheres": (np.int32, _LATE),
+        "slopes": (np.float64, 4 * (MOST + SIXTEEN)),
+        "sides": (np.float64, 4 * (MOST + SIXTEEN)),
+        "ids": (np.int32, MOST + SIXTEEN),
     },
 }
 

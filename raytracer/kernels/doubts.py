@@ -1,6 +1,6 @@
 """Doubtful pixels of spheres, decided in two-fold float64 and painted by whoever has found them.
 
-doubts ── _nearest ──> t, sphere ── _shade_hits ──> bytes of the picture
+doubts ── _nearest ──> t, sphere ── put ──> bytes of the picture, or a hit
        └─ what two-fold float64 cannot tell either ──> doubts, for `settle`
 """
 
@@ -19,10 +19,10 @@ from raytracer.kernels.visibility import holding, sphere_of
 
 
 def _decide_doubts(view, slow, bins, paints, scratch, doubts, out):
-    """Decide, paint and take off the list what two-fold float64 is certain of."""
+    """Decide and take off the list what two-fold float64 is certain of."""
     if not paints.quick.usable or len(slow.ids):
         return
-    sheet, width, hits = scratch.quick, len(view.across) - WIDTH, np.uint64(0)
+    width, waiting = len(view.across) - WIDTH, np.uint64(0)
     count, doubts[0] = doubts[0], 0
     for k in range(1, count + 1):
         row, column = doubts[k] // width, doubts[k] % width
@@ -31,15 +31,40 @@ def _decide_doubts(view, slow, bins, paints, scratch, doubts, out):
         if unsure or bins.middles[tile] < bins.starts[tile + 1]:
             doubts[0] += 1
             doubts[doubts[0]] = doubts[k]
-        elif sphere < 0 or not shades:
-            put_pixel(out, start_of(out, row, column), paints.quick.background if sphere < 0 else paints.quick.flat)
         else:
-            scratch.k[hits], sheet.spheres[hits] = t, sphere
-            sheet.late_rows[hits], sheet.late_columns[hits] = row, column
-            hits += np.uint64(1)
-        if shades and hits and (hits == WIDTH or k == count):
-            _shade_hits(view, paints, scratch, hits, out)
-            hits = np.uint64(0)
+            waiting = put(view, paints, scratch, row, column, t, sphere, waiting, out)
+    if shades and waiting:
+        _shade_hits(view, paints, scratch, waiting, out)
+
+
+@inlined
+def _put_flat(view, paints, scratch, row, column, t, sphere, waiting, out):
+    """A pixel, of which t and the sphere are known; returns how many are waiting to be shaded."""
+    put_pixel(out, start_of(out, row, column), paints.quick.background if sphere < 0 else paints.quick.flat)
+    return waiting
+
+
+@inlined
+def _put_shaded(view, paints, scratch, row, column, t, sphere, waiting, out):
+    sheet = scratch.quick
+    if sphere < 0:
+        return _put_flat(view, paints, scratch, row, column, t, sphere, waiting, out)
+    scratch.k[waiting], sheet.spheres[waiting] = t, sphere
+    sheet.late_rows[waiting], sheet.late_columns[waiting] = row, column
+    waiting += np.uint64(1)
+    if waiting == WIDTH:
+        _shade_hits(view, paints, scratch, waiting, out)
+        waiting = np.uint64(0)
+    return waiting
+
+
+@inlined
+def _put_hit(view, paints, scratch, row, column, t, sphere, waiting, out):
+    at = np.uint64((row - out.first_row) * out.width + column)
+    out.index[at] = sphere
+    if len(out.t):
+        out.t[at] = t
+    return waiting
 
 
 @called
@@ -68,8 +93,9 @@ def _shade_hits(view, paints, scratch, count, out):
     put_late(sheet, count, out)
 
 
-decide_flat = variant(_decide_doubts, "decide_flat", shades=False)
-decide_diffuse = variant(_decide_doubts, "decide_diffuse", shades=True)
+decide_flat = variant(_decide_doubts, "decide_flat", put=_put_flat, shades=False)
+decide_diffuse = variant(_decide_doubts, "decide_diffuse", put=_put_shaded, shades=True)
+decide_hits = variant(_decide_doubts, "decide_hits", put=_put_hit, shades=False)
 
 
 @inlined

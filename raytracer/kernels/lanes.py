@@ -304,6 +304,16 @@ def largest_of(typing, places):
 
 
 @intrinsic
+def equal(typing, places, others):
+    """Where two places are the same."""
+
+    def lower(context, builder, sig, args):
+        return builder.icmp_signed("==", *args)
+
+    return MASK(places, places), lower
+
+
+@intrinsic
 def equal_to(typing, places, number):
     """Where a place is a number."""
 
@@ -532,6 +542,22 @@ def gather_rows(typing, table, places):
         return _columns(context, builder, _rows(context, builder, sig.args[0], table, places))
 
     return types.UniTuple(LANES, _FOUR)(table, places), lower
+
+
+@intrinsic
+def store_rows(typing, table, i, a, b, c, d):
+    """Four lanes as the columns of rows i to i + 7 of a flat table of four columns."""
+
+    def lower(context, builder, sig, args):
+        table, i, *columns = args
+        wide, kind = _joined(builder, columns), ir.VectorType(_DOUBLE, _FOUR)
+        for row in range(WIDTH):
+            values = builder.shuffle_vector(wide, wide, _order(range(row, _FOUR * WIDTH, WIDTH)))
+            start = builder.add(builder.mul(i, ir.Constant(i.type, _FOUR)), ir.Constant(i.type, _FOUR * row))
+            builder.store(values, _address(context, builder, sig.args[0], table, start, kind), align=8)
+        return context.get_dummy_value()
+
+    return types.void(table, types.uint64, *[LANES] * _FOUR), lower
 
 
 @intrinsic

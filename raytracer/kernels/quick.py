@@ -92,7 +92,7 @@ _STEP, _LARGEST_K = np.float32(SIDE), 1.31  # of a sphere, by that of its middle
 def _paint_tile(view, slow, bins, tile, scratch, doubts, paints, out):
     """Paint a tile, unless it has something in it that single precision is not for; returns whether it is painted."""
     first, end, sheet = bins.starts[tile.number], bins.middles[tile.number], scratch.quick
-    if not paints.quick.usable or len(slow.ids) or len(out.wanted) or end - first > MOST:
+    if not paints.quick.usable or len(slow.ids) or (of_some and len(out.wanted)) or end - first > MOST:
         return False
     if end < bins.starts[tile.number + 1]:
         return False
@@ -102,7 +102,7 @@ def _paint_tile(view, slow, bins, tile, scratch, doubts, paints, out):
         return False
     if certain:
         _decide(view, bins, tile, sheet, doubts)
-    colour_all(view, bins, tile, extremes, paints, sheet, out)
+    colour_all(view, bins, tile, extremes, paints, scratch, doubts, out)
     return True
 
 
@@ -264,9 +264,10 @@ def _first_of(view, bins, tile, x, y):
     return number, unsure
 
 
-def _colour_all(view, bins, tile, extremes, paints, sheet, out):
+def _colour_all(view, bins, tile, extremes, paints, scratch, doubts, out):
     """Colours, and then bytes."""
     align_stack()
+    sheet = scratch.quick
     count = colour_tile(view, bins, tile, extremes, paints, sheet, out)
     put_tile(tile, sheet, out)
     _keep_for_later(bins, tile, count, sheet)
@@ -464,15 +465,21 @@ _shade_unchecked = variant(_shade, "_shade_unchecked", inlined, certain=False, s
 _colour_flat = variant(_colour_all, "_colour_flat", colour_tile=_flat)
 _colour_certain = variant(_colour_all, "_colour_certain", colour_tile=_shade_certain)
 _colour_unchecked = variant(_colour_all, "_colour_unchecked", colour_tile=_shade_unchecked)
-flat_quickly = variant(_paint_tile, "flat_quickly", draw_all=_draw_shapes, colour_all=_colour_flat, certain=True)
-diffuse_quickly = variant(
-    _paint_tile, "diffuse_quickly", draw_all=_draw_certain, colour_all=_colour_certain,
-    certain=True,
-)  # fmt: skip
-diffuse_quickly_unchecked = variant(
-    _paint_tile, "diffuse_quickly_unchecked", draw_all=_draw_unchecked, colour_all=_colour_unchecked,
-    certain=False,
-)  # fmt: skip
+
+
+def _quickly(name, draw_all, colour_all, certain=True, of_some=True):
+    """How to paint a tile quickly; `of_some` says whether only some pixels of a picture may be wanted."""
+    return variant(_paint_tile, name, draw_all=draw_all, colour_all=colour_all, certain=certain, of_some=of_some)
+
+
+def hits_quickly(name, put_all):
+    """How to put what a tile's pixels hit somewhere, as numbers of the tile's list."""
+    return _quickly(name, _draw_shapes, put_all, of_some=False)
+
+
+flat_quickly = _quickly("flat_quickly", _draw_shapes, _colour_flat)
+diffuse_quickly = _quickly("diffuse_quickly", _draw_certain, _colour_certain)
+diffuse_quickly_unchecked = _quickly("diffuse_quickly_unchecked", _draw_unchecked, _colour_unchecked, certain=False)
 
 
 @inlined

@@ -1,7 +1,7 @@
 """Tiles to pixels: what a tile's depth buffer holds becomes colours, or hits, or nothing but a background.
 
-    boxes, lists ─ see_tile ─> k, index ─ a painter ─> bytes of a picture, or t and index of hits
-                └─ paint_quickly, for tiles of small spheres ─> bytes (see `kernels.quick`)
+    boxes, lists ─ see_tile ─> k, index ─ a painter ─> bytes of a picture, or t and index of hits (`kernels.hits`)
+                └─ paint_quickly, for tiles of small spheres ─> the same (see `kernels.quick`, `kernels.hits`)
 
 A painter does one tile, a row at a time, eight pixels at a time. Doubtful pixels are listed, and painted all the same:
 then `kernels.doubts` decides most of spheres, and whoever called the rest, and they are painted anew.
@@ -10,25 +10,30 @@ then `kernels.doubts` decides most of spheres, and whoever called the rest, and 
 import numpy as np
 
 from raytracer.arrays import APART, Tile
-from raytracer.certified import fine_direction, refine
 from raytracer.kernels.bounds import TILE_HEIGHT, TILE_WIDTH
 from raytracer.kernels.compiler import borrowing, called, inlined, variant
 from raytracer.kernels.desks import desk_of
-from raytracer.kernels.doubts import decide_diffuse, decide_flat, leave_doubts
+from raytracer.kernels.doubts import decide_diffuse, decide_flat, decide_hits, leave_doubts
 from raytracer.kernels.full import radiance
+from raytracer.kernels.hits import (
+    fine_hits_quickly,
+    fine_hits_tile,
+    hits_tile,
+    no_hits_tile,
+    shapes_quickly,
+    shapes_tile,
+)
 from raytracer.kernels.lanes import (
     ALIKE,
     WIDTH,
     align_stack,
     any_of,
-    at_least,
     is_hit,
     largest_of,
     load,
     put_alike,
     put_pixels,
     spread,
-    store,
     take_number,
 )
 from raytracer.kernels.quick import (
@@ -41,8 +46,8 @@ from raytracer.kernels.quick import (
     shade_anew,
 )
 from raytracer.kernels.strips import fetch_row, put_pixel, start_of
-from raytracer.kernels.surfaces import ball_of, diffuse_of_any, diffuse_of_spheres, line_of, normal, ray_of
-from raytracer.kernels.visibility import STRIDE, list_doubts, see_tile, see_tile_unchecked
+from raytracer.kernels.surfaces import diffuse_of_any, diffuse_of_spheres, line_of, normal, ray_of
+from raytracer.kernels.visibility import list_doubts, place_of, see_tile, see_tile_unchecked
 from raytracer.kernels.waiting import offering, wait_for_help
 from raytracer.shading import to_byte
 from raytracer.twofold import select
@@ -157,7 +162,7 @@ def _flat_tile(view, scratch, tile, paints, out):
     colour = spread(flat[0]), spread(flat[1]), spread(flat[2])
     for row in range(tile.top, tile.bottom):
         for x in range(tile.left, tile.right, WIDTH):
-            hit = is_hit(load(scratch.index, _place(tile, row, x)))
+            hit = is_hit(load(scratch.index, place_of(tile, row, x)))
             red, green, blue = _over(background, hit, *colour)
             put_lanes(out, row, x, tile.right, red, green, blue, scratch)
 
@@ -169,7 +174,7 @@ def _shaded_tile(view, scratch, tile, paints, out):
         for x in range(tile.left, tile.right, WIDTH):
             if some and not out.wanted[row - out.first_row, x // WIDTH]:
                 continue
-            place = _place(tile, row, x)
+            place = place_of(tile, row, x)
             index = load(scratch.index, place)
             hit = is_hit(index)
             if not any_of(hit):
@@ -189,74 +194,9 @@ def _full(view, paints, line, k, row, x, where, hit, scratch):
 
 
 @inlined
-def _place(tile, row, x):
-    """Where a pixel is in the depth buffer."""
-    return np.uint64((row - tile.top) * STRIDE + x - tile.left)
-
-
-@inlined
 def _over(background, hit, red, green, blue):
     """The background where nothing is hit."""
     return select(hit, red, background[0]), select(hit, green, background[1]), select(hit, blue, background[2])
-
-
-@inlined
-def _put_hits(out, at, room, t, place, scratch):
-    """Eight hits, or as many as there is room for."""
-    if room >= WIDTH:
-        store(out.t, at, t)
-        store(out.index, at, load(scratch.index, place))
-    else:
-        store(scratch.batch, 0, t)
-        for pixel in range(np.uint64(room)):
-            out.t[at + pixel] = scratch.batch[pixel]
-            out.index[at + pixel] = scratch.index[place + pixel]
-
-
-@called
-def _hits_tile(view, scratch, tile, paints, out):
-    """t and index as they are in the buffer."""
-    for row in range(tile.top, tile.bottom):
-        a1, a0, _, _, _ = line_of(view, row)
-        start = np.uint64((row - out.first_row) * out.width)
-        for x in range(tile.left, tile.right, WIDTH):
-            across, place, at = load(view.across, x), _place(tile, row, x), start + np.uint64(x)
-            index = load(scratch.index, place)
-            t = load(scratch.k, place) / ((across * view.a2 + a1) * across + a0)
-            t = select(is_hit(index), t, np.inf)
-            _put_hits(out, at, tile.right - x, t, place, scratch)
-
-
-@called
-def _fine_hits_tile(view, scratch, tile, fine, out):
-    """t to the last digit, and index; where that is not certain, NaN."""
-    for row in range(tile.top, tile.bottom):
-        a1, a0, _, _, _ = line_of(view, row)
-        start, r = np.uint64((row - out.first_row) * out.width), np.uint64(row)
-        for x in range(tile.left, tile.right, WIDTH):
-            across, place, at = load(view.across, x), _place(tile, row, x), start + np.uint64(x)
-            index, low, u, eye = load(scratch.index, place), load(fine.across_low, x), view.u, view.eye
-            hit = is_hit(index)
-            if not any_of(hit):
-                _put_hits(out, at, tile.right - x, spread(np.inf), place, scratch)
-                continue
-            t = load(scratch.k, place) / ((across * view.a2 + a1) * across + a0)
-            cx, cy, cz, radius = ball_of(view, select(hit, index, spread(largest_of(index))))
-            dx = fine_direction(across, low, u[0], fine.x[r], fine.x_low[r])
-            dy = fine_direction(across, low, u[1], fine.y[r], fine.y_low[r])
-            dz = fine_direction(across, low, u[2], fine.z[r], fine.z_low[r])
-            finer, sure = refine(t, dx, dy, dz, eye[0], eye[1], eye[2], cx, cy, cz, radius)
-            sure = sure & ~at_least(index, view.first_facet)
-            t = select(hit, select(sure, finer, np.nan), np.inf)
-            _put_hits(out, at, tile.right - x, t, place, scratch)
-
-
-@called
-def _no_hits_tile(scratch, tile, paints, out):
-    for row in range(tile.top, tile.bottom):
-        start = (row - out.first_row) * out.width
-        for x in range(start + tile.left, start + tile.right):
-            out.t[x], out.index[x] = np.inf, -1
 
 
 _diffuse_tile = variant(_shaded_tile, "_diffuse_tile", shade=diffuse_of_spheres)
@@ -285,5 +225,7 @@ paint_diffuse_unchecked = _painter(
 paint_diffuse_any = _painter("paint_diffuse_any", _diffuse_any_tile, **_DIFFUSE)
 paint_full = _painter("paint_full", _full_tile)
 paint_normal = _painter("paint_normal", _normal_tile)
-find_hits = _painter("find_hits", _hits_tile, fill_tile=_no_hits_tile)
-find_fine_hits = _painter("find_fine_hits", _fine_hits_tile, fill_tile=_no_hits_tile)
+find_hits = _painter("find_hits", hits_tile, no_hits_tile)
+_BY_SHAPE = {"fill_tile": no_hits_tile, "decide": decide_hits}
+find_shapes = _painter("find_shapes", shapes_tile, paint_quickly=shapes_quickly, **_BY_SHAPE)
+find_fine_hits = _painter("find_fine_hits", fine_hits_tile, paint_quickly=fine_hits_quickly, **_BY_SHAPE)

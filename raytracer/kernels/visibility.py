@@ -117,6 +117,12 @@ def _draw(draw_row, draw_pair, view, bins, place, j, tile, scratch):
 
 
 @inlined
+def place_of(tile, row, x):
+    """Where a pixel of the picture is in the depth buffer."""
+    return np.uint64((row - tile.top) * STRIDE + x - tile.left)
+
+
+@inlined
 def fetch(view, sphere):
     """A sphere will be wanted soon: to be drawn, and then to be painted."""
     fetch_ahead(view.balls, np.uint64(4) * sphere)

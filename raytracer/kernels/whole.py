@@ -2,10 +2,9 @@
 
 import numpy as np
 
-from raytracer.kernels.compiler import borrowing
+from raytracer.kernels.compiler import borrowing, inlined
 from raytracer.kernels.desks import desk_of
-from raytracer.kernels.lanes import WIDTH, is_hit, load, spread
-from raytracer.kernels.strips import start_of
+from raytracer.kernels.lanes import WIDTH, equal, is_hit, load, mask_of, smallest_of, spread
 from raytracer.kernels.tiles import put_lanes
 from raytracer.shading import grey_of, to_byte
 from raytracer.twofold import select
@@ -33,11 +32,15 @@ def mean_of_blocks(large, side, wanted, out):
 @borrowing
 def range_of(t, index):
     """The smallest and the largest t of all hits, or +inf and 0."""
-    near, far = np.inf, 0.0
-    for p in range(len(t)):
+    near, far, eights = spread(np.inf), spread(0.0), np.uint64(len(t) // WIDTH * WIDTH)
+    for p in range(np.uint64(0), eights, np.uint64(WIDTH)):
+        hit, some = is_hit(load(index, p)), load(t, p)
+        near, far = select(hit & (some < near), some, near), select(hit & (some > far), some, far)
+    nearest, farthest = smallest_of(near), -smallest_of(-far)
+    for p in range(eights, np.uint64(len(t))):
         if index[p] >= 0:
-            near, far = min(near, t[p]), max(far, t[p])
-    return near, far
+            nearest, farthest = min(nearest, t[p]), max(farthest, t[p])
+    return nearest, farthest
 
 
 @borrowing
@@ -54,14 +57,20 @@ def paint_depth(t, index, near, far, first, last, width, desks, worker, paints, 
 
 @borrowing
 def paint_edges(t, index, near, far, first, last, width, desks, worker, paints, out):
-    """`stages.edges` of rows first to last − 1."""
-    height, step = (len(index) - WIDTH) // width, np.uint64(width)
+    """`stages.edges` of rows first to last − 1. The arrays have eight elements to spare."""
+    scratch, height = desk_of(desks.memory, worker), (len(index) - WIDTH) // width
     for row in range(first, last):
-        below = step if row + 1 < height else np.uint64(0)
-        for x in range(width):
+        below = np.uint64(width if row + 1 < height else 0)
+        for x in range(0, width, WIDTH):
             p = np.uint64(row * width + x)
-            right = np.uint64(1) if x + 1 < width else np.uint64(0)
-            edge = (index[p] != index[p + right]) | (index[p] != index[p + below])
-            start = start_of(out, row, x)
-            byte = np.uint8(0) if edge else np.uint8(255)
-            out.bytes[start], out.bytes[start + np.uint64(1)], out.bytes[start + np.uint64(2)] = byte, byte, byte
+            here = load(index, p)
+            same_right = equal(here, load(index, p + np.uint64(1))) | ~_before(width - 1 - x)
+            same = same_right & equal(here, load(index, p + below))
+            grey = select(same, spread(255.0), spread(0.0))
+            put_lanes(out, row, x, width, grey, grey, grey, scratch)
+
+
+@inlined
+def _before(count):
+    """The first so many of eight lanes."""
+    return mask_of(np.uint8((1 << min(count, WIDTH)) - 1))
