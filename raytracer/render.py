@@ -166,7 +166,8 @@ def _paint_together(
     be decided, finish(*workers) decides.
     """
     moments, everyone = screen.moments(plan.shading), range(screen.threads)
-    bands, call = screen.pieces(moments), together(screen.workers(moments))
+    call = together(screen.workers(moments))
+    bands = screen.pieces(moments) if watch.rounds == 1 else screen.bands(plan.shading)  # as many in each round
     for rows in bands:
         watch.check()
         done = work(rows, call)

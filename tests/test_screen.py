@@ -131,6 +131,21 @@ def test_arrays_that_hits_cannot_be_written_into(t, index, message):
         eye_hits(Scene(), 6, 5, out=Hits(t, index))
 
 
+@pytest.mark.parametrize("stage", ["diffuse", "depth", "edges", "cost"])
+@pytest.mark.parametrize("height", [20, 3000])
+def test_progress_counts_up_to_the_same_total(stage, height):
+    told, shown = [], np.zeros(height, int)
+
+    def progress(done, total, rows):
+        told.append((done, total))
+        shown[rows] += 1
+
+    drawn(spread(50), stage, 900, height, KERNELS, progress=progress)
+    total = told[-1][1]
+    assert told == [(done, total) for done in range(1, total + 1)]
+    assert (shown == 1).all()
+
+
 def test_the_picture_does_not_depend_on_threads():
     scene = spread(20_000, seed=2)
     one = render_scene(scene, "diffuse", 300, 200, threads=1)
