@@ -462,4 +462,4 @@ class HitRows(NamedTuple):
     index: np.ndarray  # type: ignore[assignment]
     first_row: int
     width: int
-    is_left: np.ndarray  # int64 (1,): 1 once some t is not a number, as its last digit is not certain
+    is_left: np.ndarray  # int64 (1,): 1 once some t may be no number, as its last digit is not certain

@@ -2,7 +2,7 @@
 
 Loading the compiler takes longer than numpy takes for a small picture. Nobody knows how many pictures will follow, so
 numpy is used until it has cost as much as loading would have: then the whole never costs more than twice the best (the
-ski-rental rule: R. Karp, "On-line algorithms versus off-line algorithms", 1992). Both paths find the same bits.
+ski-rental rule: R. Karp, "On-line algorithms versus off-line algorithms", 1992). Both paths draw the same bytes.
 """
 
 from __future__ import annotations

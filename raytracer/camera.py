@@ -46,7 +46,8 @@ _DIGITS = 80
 def is_right(camera: Camera) -> bool:
     """Whether u, v, w are of length 1, and at right angles."""
     axes = camera.u, camera.v, camera.w
-    return all(abs(inner(*a, *b) - float(a is b)) <= _CROOKED for a in axes for b in axes)
+    pairs = ((i, j) for i in range(3) for j in range(3))
+    return all(abs(inner(*axes[i], *axes[j]) - float(i == j)) <= _CROOKED for i, j in pairs)
 
 
 def in_pixels(raster: Raster) -> tuple[float, float, float]:

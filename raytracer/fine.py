@@ -14,8 +14,9 @@ above 4u times the sum S of its terms' sizes, so that of three products and thei
 and V (2u² each, see `camera`), their products and sums, that is below 64u² times the sizes of terms, which are at most
 m·l for h and m² for a (see `certified`), and below 40u²·l² for c. In f, products and sums add less than
 24u² (a·t² + 2|h|t + c). Altogether f is off by less than 100u² (m·t + l)². The frame is a right one, so m² ≤ 3 D·D, and
-t|D| ≤ l for a near hit: f is off by less than 2⁻⁹⁶·l², and t by that over 2t√disc of itself. With l² ≤ 1.2c that is
-below 2⁻⁵⁸ where c ≤ 2³⁷·t√disc. What the step leaves is a·δ² / 2√disc, δ its length.
+t|D| ≤ l for a near hit: f is off by less than 2⁻⁹⁶·l², and t by that over 2t√disc of itself. A radius is a quarter of
+the depth at most (see `kernels.quick`), so l² ≤ 1.2c, and that is below 2⁻⁵⁸ where c ≤ 2³⁷·t√disc. What the step leaves
+is a·δ² / 2√disc, δ its length, and less than that as √disc is rounded.
 """
 
 from __future__ import annotations
@@ -83,11 +84,14 @@ def square_of_row(up: Twofold, frame: Frame) -> tuple[Twofold, Twofold]:
 
 
 def meet(h: Twofold, a: Twofold, c: Twofold) -> tuple[Number, Number]:
-    """t of a ray's near hit, of a sphere that is well before the eye; and whether it is off by less than an ulp."""
+    """t of a ray's near hit, of a sphere whose radius is at most a quarter of its depth; and whether that is certain.
+
+    Then it is off by less than an ulp.
+    """
     root = np.sqrt(h[0] * h[0] - a[0] * c[0])
     t = (-h[0] - root) / a[0]
     product, error = two_product(a[0], t)
-    high, rest = quick_two_sum(h[0] + h[0], product)  # |2h| ≥ |h| + √disc
+    high, rest = quick_two_sum(h[0] + h[0], product)  # a·t₀ = |h| − √disc is the smaller one
     low = times_plus(a[1], t, error) + (rest + (h[1] + h[1]))
     product, error = two_product(high, t)
     step = ((product + c[0]) + (times_plus(low, t, error) + c[1])) / (root + root)

@@ -24,7 +24,7 @@ from raytracer.stages import LIGHT_RANGE, STAGES, Stage
 _REFLECTIONS = 4  # that follow each other where there are mirrors, about
 _TESTS_FOR_ONE = 8  # tests of rays that start on a shape, many together, in the time of one of an eye ray
 _LEAST, _MOST = 1e-70, 1e70  # lengths whose squares, and products of four, are numbers that float64 holds in full
-_QUICK = "paint_flat", "paint_diffuse", "paint_diffuse_any"  # painters that begin with single precision
+_QUICK = "paint_flat", "paint_diffuse", "paint_diffuse_any", "paint_edges"  # painters that begin with single precision
 _TESTS_A_LIGHT = 6  # what shading by a light costs, in tests of a ray against a sphere
 
 

@@ -122,9 +122,9 @@ class Watch:
         if self.cancelled is not None and self.cancelled():
             raise Cancelled
 
-    def tell(self, bands: int, rows: slice) -> None:
-        """One more of so many bands is done, and these rows of the picture."""
-        self.done += 1
+    def tell(self, bands: int, rows: slice, more: int = 1) -> None:
+        """One more of so many bands is done, or some, and these rows of the picture."""
+        self.done += more
         if self.progress is not None:
             self.progress(self.done, self.rounds * bands, rows)
 
@@ -166,14 +166,14 @@ def _paint_together(
     be decided, finish(*workers) decides.
     """
     moments, everyone = screen.moments(plan.shading), range(screen.threads)
-    call = together(screen.workers(moments))
-    bands = screen.pieces(moments) if watch.rounds == 1 else screen.bands(plan.shading)  # as many in each round
-    for rows in bands:
+    pieces, call = screen.pieces(moments), together(screen.workers(moments))
+    count = len(pieces) if watch.rounds == 1 else len(screen.bands(plan.shading))  # as in the other round
+    for k, rows in enumerate(pieces):
         watch.check()
         done = work(rows, call)
-        if len(bands) > 1 and screen.is_crowded:
+        if len(pieces) > 1 and screen.is_crowded:
             finish(*everyone)
-        watch.tell(len(bands), done)
+        watch.tell(count, done, count * (k + 1) // len(pieces) - count * k // len(pieces))
     finish(*everyone)
 
 
@@ -185,7 +185,8 @@ def _hunt(plan: Plan, screen: Screen, watch: Watch, hits: Hits, kind: str) -> No
         hunt.find(rows, call=call)
         return slice(rows.start, rows.start)
 
-    _paint_together(plan, screen, watch, find, hunt.settle)
+    _paint_together(plan, screen, watch, find, hunt.decide)
+    hunt.polish()
 
 
 @dataclass
@@ -238,7 +239,7 @@ def _paint_whole(plan: Plan, screen: Screen, canvas: Canvas, watch: Watch) -> No
         painter(*hits, near, far, rows.start, rows.stop, width, screen.desks, worker, paints, canvas)
         return rows
 
-    _hunt(plan, screen, watch, Hits(t, index), "" if has_t else "shapes")
+    _hunt(plan, screen, watch, Hits(t, index), "rough" if has_t else "shapes")
     if screen.unit:
         np.ldexp(t, screen.unit, out=t)  # in the scene's own unit some may be too small or too large for a float64
     painter = getattr(plan.path, plan.painter)
@@ -292,7 +293,7 @@ def hits_of(
     if not isinstance(tracer, Screen):
         share_bands(tracer, plan, watch or Watch(), trace)
         return hits
-    _hunt(plan, tracer, watch or Watch(), hits, "fine" if polished else "")
+    _hunt(plan, tracer, watch or Watch(), hits, "fine" if polished else "rough")
     found = tracer.in_scene(hits)
     if out is None:
         return found
@@ -317,21 +318,28 @@ def eye_hits(
     index is the shape's place among all shapes of the file; `scene.shape(index)` is the shape. t counts multiples of
     the ray's direction, which is not normalised.
 
-    `out` are two such arrays, one row behind the other, to be written into. ValueError for those that are not, and for
-    a size, sampling or method that there is not, `PictureTooLargeError` before a ray is shot.
+    `out` are such hits, of arrays that share nothing, one row behind the other, to be written into. ValueError for
+    those that are not, and for a size, sampling or method that there is not, `PictureTooLargeError` before a ray is
+    shot.
     """
     plan = make_plan(scene, "hit", width, height, sampling, method)
-    if out is not None:
-        _check_hits(out, (height, width))
+    room = None if out is None else _room_in(out, (height, width))
     with open_tracer(plan, threads) as tracer:
-        return hits_of(plan, tracer, Watch(threads), polished=True, out=out)
+        hits = hits_of(plan, tracer, Watch(threads), polished=True, out=room)
+    return hits if out is None else out
 
 
-def _check_hits(out: Hits, shape: tuple[int, int]) -> None:
+def _room_in(out: Hits, shape: tuple[int, int]) -> Hits:
+    """The arrays that hits are written into."""
+    if not isinstance(out, Hits):
+        raise ValueError(f"out: found {type(out).__name__}, expected Hits")
     for name, array, kind in zip(Hits._fields, out, (np.float64, np.int32), strict=True):
         fitting(array, shape, kind, f"out.{name}")
         if not array.flags.c_contiguous:
             raise ValueError(f"out.{name}: found rows that lie apart, expected one behind the other")
+    if np.may_share_memory(*out):
+        raise ValueError("out: found arrays that share memory, expected two")
+    return Hits(*map(np.asarray, out))  # of a matrix, rows are matrices
 
 
 def undecided(scene: Scene, width: int, height: int, sampling: str = "corner") -> np.ndarray:
@@ -371,4 +379,6 @@ def fitting(out: np.ndarray, shape: tuple[int, ...], kind: type = np.uint8, name
     if not isinstance(out, np.ndarray) or out.shape != shape or out.dtype != kind:
         found = f"{out.dtype} {out.shape}" if isinstance(out, np.ndarray) else type(out).__name__
         raise ValueError(f"{name}: found {found}, expected {np.dtype(kind)} {shape}")
+    if not out.flags.writeable:
+        raise ValueError(f"{name}: found an array that is read-only, expected one to write into")
     return out

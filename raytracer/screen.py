@@ -176,20 +176,23 @@ class Screen(NamedTuple):
     def hits(self, rows: slice, worker: int = 0, polished: bool = False) -> Hits:
         """What the rays of these rows, cut between tiles, hit first: as `Eye.hits`."""
         shape = rows.stop - rows.start, self.raster.width
-        hunt = self.hunt(Hits(np.empty(shape), np.empty(shape, np.int32)), "fine" if polished else "", rows.start)
+        hunt = self.hunt(Hits(np.empty(shape), np.empty(shape, np.int32)), "fine" if polished else "rough", rows.start)
         hunt.find(rows, worker)
-        hunt.settle(worker)
+        hunt.decide(worker)
+        hunt.polish()
         return self.in_scene(hunt.hits)
 
     @_NOT_A_NUMBER_IS_NO_ERROR
-    def hunt(self, hits: Hits, kind: str = "", first_row: int = 0) -> Hunt:
+    def hunt(self, hits: Hits, kind: str, first_row: int = 0) -> Hunt:
         """Look for `hits` of rows from first_row on, in units, and with numbers of spheres.
 
-        `kind` says what is wanted: t good enough to be shaded; "fine": to the last digit; "shapes": only the index.
+        `kind` says what is wanted: "rough" is t good enough to be shaded, "fine" to the last digit; "shapes" is only
+        the index.
         """
-        kernel, paints = _HUNTS[kind], _NO_PAINTS if kind == "" else self._fine_rays()
         flat = HitRows(hits.t.reshape(-1), hits.index.reshape(-1), first_row, self.raster.width, np.zeros(1, np.int64))
-        return Hunt(self, hits, flat, kernel, paints)
+        if kind == "rough":
+            return Hunt(self, hits, flat, "find_hits", _NO_PAINTS)
+        return Hunt(self, hits, flat, "find_shapes" if kind == "shapes" else "find_fine_hits", self._fine_rays())
 
     def room_for_hits(self, has_t: bool) -> Hits:
         """Flat arrays for the hits of all pixels, and some elements to spare; without t, that is empty."""
@@ -260,9 +263,6 @@ class Screen(NamedTuple):
         yield Pixels(self, xs, ys)
 
 
-_HUNTS = {"": "find_hits", "fine": "find_fine_hits", "shapes": "find_shapes"}
-
-
 class Hunt(NamedTuple):
     """The hits of a screen, or of some of its rows, while a kernel looks for them."""
 
@@ -274,18 +274,22 @@ class Hunt(NamedTuple):
 
     @_NOT_A_NUMBER_IS_NO_ERROR
     def find(self, rows: slice, worker: int = 0, call: Call = alone) -> None:
-        """Look for what these rows hit; what is left to do, `settle` does."""
+        """Look for what these rows hit; what is left to do, `decide` does, and at the end `polish`."""
         tiles = self.screen.tiles_of(rows)
         for doubtful in self.screen.paint(self.kernel, tiles, self.paints, self.flat, worker, call):
             doubtful.decide(self.hits, self.flat.first_row)
 
     @_NOT_A_NUMBER_IS_NO_ERROR
-    def settle(self, *workers: int) -> None:
-        """Decide what these workers have listed as doubtful, and polish t where that is still to be done."""
+    def decide(self, *workers: int) -> None:
+        """Decide what these workers have listed as doubtful."""
         for doubtful in self.screen.doubtful(*workers):
             doubtful.decide(self.hits, self.flat.first_row)
+
+    @_NOT_A_NUMBER_IS_NO_ERROR
+    def polish(self) -> None:
+        """Bring to the last digit what kernels have left, once all rows are found: before, there may be anything."""
         if self.flat.is_left[0]:
-            self.flat.is_left[0], t = 0, self.hits.t
+            t = self.hits.t
             ys, xs = np.nonzero(np.isnan(t))
             some, pixels = Hits(t[ys, xs], self.hits.index[ys, xs]), Pixels(self.screen, xs, ys + self.flat.first_row)
             polish(some, (np.arange(len(xs)),), pixels, self.screen.targets)

@@ -3,7 +3,6 @@
 from dataclasses import replace
 from functools import cache
 from types import SimpleNamespace
-from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -23,6 +22,7 @@ KERNELS = backend.load()
 if backend.why_no_compiler() == "":
     from raytracer.kernels import lanes, sixteen
     from raytracer.kernels.compiler import borrowing
+    from raytracer.kernels.desks import desk_of
     from raytracer.kernels.limits import limits_of, nearness_of
     from raytracer.kernels.quick import _light
 SIZE = 203, 150
@@ -210,12 +210,6 @@ def test_no_light_is_closer_to_what_a_tile_shows_than_its_bound():
     assert known > 150
 
 
-class Columns(NamedTuple):
-    """What `_light` reads of a sheet."""
-
-    columns: np.ndarray
-
-
 def some_light(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """By how much colours of 32 spheres of a tile, most of them near a rim, are off, and how much they may be.
 
@@ -242,11 +236,19 @@ def some_light(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     off = 255 * coarseness_of(quick.parts, 1 / size, longest / quick.focus, quick.focus, quick.widest)
     places = np.rint(np.stack([at_x, at_y]) * quick.parts).astype(np.int32).view(np.float32)
     scaled = [size * quick.parts, depth / (quick.focus * quick.parts), *[255 / (size * quick.parts)] * 3, off]
-    sheet = Columns(np.concatenate([*places, *np.float32(scaled)]))
+    table = np.concatenate([*places, *np.float32(scaled)])
     extremes = (1 / size).max(), (rho * depth).max(), depth.min(), depth.max()
     found = np.empty(3 * 32, np.float32)
     of_slope, of_all, steepest = lighting()(
-        quick, sheet, tile, longest, extremes, *fine, np.float32([*u, *v] * 4), found
+        quick,
+        np.zeros((1, KERNELS.DESK), np.uint8),
+        table,
+        tile,
+        longest,
+        extremes,
+        *fine,
+        np.float32([*u, *v] * 4),
+        found,
     )
     red, steep, off = found.reshape(3, 32)
     sure = steep < steepest
@@ -278,7 +280,10 @@ def lighting():
     """A kernel: what `_light` finds for 32 pixels, red, ρ and c₁ in three rows; it returns the tile's limits."""
 
     @borrowing
-    def lit(quick, sheet, tile, longest, extremes, x, y, rays, found):
+    def lit(quick, memory, table, tile, longest, extremes, x, y, rays, found):
+        sheet = desk_of(memory, 0).quick
+        for k in range(len(table)):
+            sheet.columns[k] = table[k]
         u, v, _, _, _, _, _, _ = sixteen.load_columns(rays)
         first, second = np.uint64(0), np.uint64(16)
         rows = sixteen.load_two(x, first, second), sixteen.load_two(y, first, second)

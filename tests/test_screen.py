@@ -22,6 +22,7 @@ from raytracer.screen import open_screen
 
 pytestmark = pytest.mark.skipif(backend.why_no_compiler() != "", reason="numba is not installed")
 KERNELS = backend.load()
+SHARED = np.zeros(240, np.uint8)
 PAINTED = [name for name, stage in STAGES.items() if stage.painter]
 
 
@@ -124,11 +125,41 @@ def test_hits_may_be_written_into_given_arrays(name):
         (np.zeros((5, 6)), np.zeros((6, 5), np.int32), r"out.index: found int32 \(6, 5\), expected int32 \(5, 6\)"),
         (np.zeros((5, 6), np.float32), np.zeros((5, 6), np.int32), r"out.t: found float32 .*, expected float64"),
         (np.zeros((5, 7))[:, :6], np.zeros((5, 6), np.int32), "out.t: found rows that lie apart"),
+        (np.broadcast_to(0.0, (5, 6)), np.zeros((5, 6), np.int32), "out.t: found an array that is read-only"),
+        (SHARED[:240].view(float).reshape(5, 6), SHARED[120:240].view(np.int32).reshape(5, 6), "share memory"),
     ],
 )
 def test_arrays_that_hits_cannot_be_written_into(t, index, message):
     with pytest.raises(ValueError, match=message):
         eye_hits(Scene(), 6, 5, out=Hits(t, index))
+
+
+def test_other_things_that_hits_cannot_be_written_into():
+    with pytest.raises(ValueError, match="out: found tuple, expected Hits"):
+        eye_hits(Scene(), 6, 5, out=(np.zeros((5, 6)), np.zeros((5, 6), np.int32)))
+    with pytest.raises(ValueError, match="read-only"):
+        render_scene(Scene(), width=6, height=5, out=np.broadcast_to(np.uint8(0), (5, 6, 3)))
+
+
+@pytest.mark.filterwarnings("ignore:the matrix subclass")
+def test_hits_may_be_written_into_a_matrix():
+    scene = spread(300, seed=4)
+    out = Hits(np.asmatrix(np.zeros((50, 70))), np.asmatrix(np.zeros((50, 70), np.int32)))
+    eye_hits(scene, 70, 50, out=out)
+    expected = eye_hits(scene, 70, 50)
+    np.testing.assert_array_equal(np.asarray(out.t), expected.t)
+    np.testing.assert_array_equal(np.asarray(out.index), expected.index)
+
+
+def test_only_what_has_been_looked_for_is_polished(monkeypatch):
+    """Between two pieces of a picture, what is beyond is anything, such as no number, of a shape that there is not."""
+    scene = interpreter("scenes/06_icosahedron_and_sphere.cli")
+    expected = eye_hits(scene, 64, 300)
+    monkeypatch.setattr(screen.Screen, "pieces", lambda self, moments: self._cut(1))
+    monkeypatch.setattr(screen.Screen, "is_crowded", True)
+    out = eye_hits(scene, 64, 300, out=Hits(np.full((300, 64), np.nan), np.full((300, 64), 10**9, np.int32)))
+    for found, array in zip(out, expected, strict=True):
+        np.testing.assert_array_equal(found, array)
 
 
 @pytest.mark.parametrize("stage", ["diffuse", "depth", "edges", "cost"])
@@ -141,8 +172,9 @@ def test_progress_counts_up_to_the_same_total(stage, height):
         shown[rows] += 1
 
     drawn(spread(50), stage, 900, height, KERNELS, progress=progress)
-    total = told[-1][1]
-    assert told == [(done, total) for done in range(1, total + 1)]
+    counts, totals = zip(*told, strict=True)
+    assert list(counts) == sorted(counts)
+    assert set(totals) == {counts[-1]}
     assert (shown == 1).all()
 
 

@@ -19,7 +19,7 @@ from raytracer.kernels.visibility import holding, sphere_of
 
 
 def _decide_doubts(view, slow, bins, paints, scratch, doubts, out):
-    """Decide and take off the list what two-fold float64 is certain of."""
+    """Decide and take off the list what two-fold float64 is certain of. `shades` says whether any are to be shaded."""
     if not paints.quick.usable or len(slow.ids):
         return
     width, waiting = len(view.across) - WIDTH, np.uint64(0)

@@ -7,6 +7,8 @@
                        └─ fine_hits_quickly ────> t to the last digit, or the pixel is listed as doubtful; index
 
 In single precision no t is worked out. Of the spheres of a list, all that their pixels share is tabulated first.
+
+What differs between these is given to the two templates, `_put_tile` and `_put_strips`, by name (see `variant`).
 """
 
 import numpy as np
@@ -46,16 +48,16 @@ _ONE, _TWO, _THREE, _FOUR = (np.uint64(k) for k in range(1, 5))
 
 
 def _put_tile(view, scratch, tile, paints, out):
-    """Put what the pixels of a tile hit into the rows of `out`, eight at a time."""
+    """Put what the pixels of a tile hit into the rows of `out`, eight at a time; t if that is wanted (`has_t`)."""
     for row in range(tile.top, tile.bottom):
-        start = _start_of(out, row)
+        start, rests = _start_of(out, row), rests_of(view, paints, row)
         for x in range(tile.left, tile.right, WIDTH):
             index, at, room = index_of(scratch, tile, row, x), start + np.uint64(x), tile.right - x
             _put(out.index, at, room, index, scratch.quick.bits)
             if has_t:
                 t = spread(np.inf)
                 if any_of(is_hit(index)):
-                    t = select(is_hit(index), t_of(view, paints, scratch, tile, row, x, index, out), np.inf)
+                    t = select(is_hit(index), t_of(view, paints, scratch, tile, row, x, index, rests, out), np.inf)
                 _put(out.t, at, room, t, scratch.batch)
 
 
@@ -97,20 +99,33 @@ def _index_in_buffer(scratch, tile, row, x):
 
 
 @inlined
-def _t_in_buffer(view, paints, scratch, tile, row, x, index, out):
+def _no_rests(view, paints, row):
+    """Of a row, where t is rough."""
+    return 0.0
+
+
+@inlined
+def _fine_rests(view, rays, row):
+    """D of a row's rays but for U·u, each component in two-fold float64."""
+    up, quick = (view.up[np.uint64(row)], rays.up_low[np.uint64(row)]), rays.quick
+    v, w, back = quick.v, quick.w, quick.back
+    return fine_rest(up, v[0], w[0], back), fine_rest(up, v[1], w[1], back), fine_rest(up, v[2], w[2], back)
+
+
+@inlined
+def _t_in_buffer(view, paints, scratch, tile, row, x, index, rests, out):
     across, r = load(view.across, x), np.uint64(row)
     return load(scratch.k, place_of(tile, row, x)) / ((across * view.a2 + view.a1[r]) * across + view.a0[r])
 
 
 @inlined
-def _fine_t_in_buffer(view, rays, scratch, tile, row, x, index, out):
-    hit, across, low, r = is_hit(index), load(view.across, x), load(rays.across_low, x), np.uint64(row)
-    up, (u, v, w), back = (view.up[r], rays.up_low[r]), (rays.quick.u, rays.quick.v, rays.quick.w), rays.quick.back
-    dx = fine_direction(across, low, u[0], *fine_rest(up, v[0], w[0], back))
-    dy = fine_direction(across, low, u[1], *fine_rest(up, v[1], w[1], back))
-    dz = fine_direction(across, low, u[2], *fine_rest(up, v[2], w[2], back))
+def _fine_t_in_buffer(view, rays, scratch, tile, row, x, index, rests, out):
+    hit, across, low, u = is_hit(index), load(view.across, x), load(rays.across_low, x), view.u
+    dx = fine_direction(across, low, u[0], *rests[0])
+    dy = fine_direction(across, low, u[1], *rests[1])
+    dz = fine_direction(across, low, u[2], *rests[2])
     cx, cy, cz, radius = ball_of(view, select(hit, index, spread(largest_of(index))))
-    t, eye = _t_in_buffer(view, rays, scratch, tile, row, x, index, out), view.eye
+    t, eye = _t_in_buffer(view, rays, scratch, tile, row, x, index, rests, out), view.eye
     finer, sure = refine(t, dx, dy, dz, eye[0], eye[1], eye[2], cx, cy, cz, radius)
     sure = sure & ~at_least(index, view.first_facet)
     if any_of(hit & ~sure):
@@ -118,10 +133,12 @@ def _fine_t_in_buffer(view, rays, scratch, tile, row, x, index, out):
     return select(sure, finer, np.nan)
 
 
-_BUFFER = {"index_of": _index_in_buffer, "t_of": _t_in_buffer}
+_BUFFER = {"index_of": _index_in_buffer, "t_of": _t_in_buffer, "rests_of": _no_rests}
 hits_tile = variant(_put_tile, "hits_tile", has_t=True, **_BUFFER)
 shapes_tile = variant(_put_tile, "shapes_tile", has_t=False, **_BUFFER)
-fine_hits_tile = variant(_put_tile, "fine_hits_tile", has_t=True, **_BUFFER | {"t_of": _fine_t_in_buffer})
+fine_hits_tile = variant(
+    _put_tile, "fine_hits_tile", has_t=True, **_BUFFER | {"t_of": _fine_t_in_buffer, "rests_of": _fine_rests}
+)
 
 
 # -------------------------------------------------------------------------------------------------------- of strips

@@ -468,7 +468,7 @@ _colour_unchecked = variant(_colour_all, "_colour_unchecked", colour_tile=_shade
 
 
 def _quickly(name, draw_all, colour_all, certain=True, of_some=True):
-    """How to paint a tile quickly; `of_some` says whether only some pixels of a picture may be wanted."""
+    """How to paint a tile quickly; `of_some` says whether `out` has `wanted`, as a picture of which some pixels are."""
     return variant(_paint_tile, name, draw_all=draw_all, colour_all=colour_all, certain=certain, of_some=of_some)
 
 
