@@ -25,6 +25,7 @@ from typing import NamedTuple
 import numpy as np
 
 from raytracer import backend, peers
+from raytracer.arrays import Hits
 from raytracer.interpreter import interpreter, write_scene
 from raytracer.measure import Lane, clocked
 from raytracer.methods import CERTIFIED, METHODS
@@ -401,16 +402,17 @@ def hits(effort: Effort, seed: int, progress: Progress) -> Iterator[Section | Ch
         progress(f"eye_hits, {n:,} spheres")
         scene = spread(n, seed)
         views = [replace(scene, camera=camera) for camera in cameras(scene)]
-        lanes = {"eye_hits": _hits_lane(views, effort.size)}
+        kept = eye_hits(scene, *effort.size)
+        lanes = {"eye_hits, out=": _hits_lane(views, effort.size, kept), "eye_hits": _hits_lane(views, effort.size)}
         timings = interleaved(lanes, effort.rounds, effort.seconds)
         rows += rows_of(timings, n, effort.size, pixels(effort.size))
     title = f"Hits: t to the last digit and index, {named(effort.size)}"
     yield Section("hits", title, "ray", "", "", tuple(rows))
 
 
-def _hits_lane(views: list[Scene], size: Size) -> Callable[[int], tuple[float, float]]:
+def _hits_lane(views: list[Scene], size: Size, out: Hits | None = None) -> Callable[[int], tuple[float, float]]:
     def lane(turn: int) -> tuple[float, float]:
-        seconds, _ = clocked(partial(eye_hits, views[turn % len(views)], *size))
+        seconds, _ = clocked(partial(eye_hits, views[turn % len(views)], *size, out=out))
         return seconds, seconds
 
     return lane

@@ -204,7 +204,7 @@ def test_there_is_a_row_for_everything(report):
     assert [name for name, _ in rows["threads"]] == ["1 thread", "2 threads"]
     assert [name for name, _ in rows["stages"]] == list(STAGES)
     assert [name for name, _ in rows["methods"]] == list(METHODS)
-    assert rows["hits"] == [("eye_hits", n) for n in SMALL.spheres]
+    assert rows["hits"] == [(name, n) for n in SMALL.spheres for name in ("eye_hits, out=", "eye_hits")]
     assert [n for _, n in rows["rays"]] == [5, 10]
     assert rows["parsing"] == [(f"{OURS}, all digits", 40), (f"{OURS}, 6 decimals", 40)]
 
