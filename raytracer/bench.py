@@ -27,7 +27,7 @@ import numpy as np
 from raytracer import backend, peers
 from raytracer.arrays import Hits
 from raytracer.interpreter import interpreter, write_scene
-from raytracer.measure import Lane, clocked
+from raytracer.measure import Lane, Result, clocked
 from raytracer.methods import CERTIFIED, METHODS
 from raytracer.plan import make_plan
 from raytracer.render import draw, eye_hits, render_scene, warm_up
@@ -224,17 +224,22 @@ def calling(work: Callable[[], object]) -> Lane:
     return lane
 
 
+def _in_a_row(turn: int, call: Callable[[], tuple[float, Result]]) -> tuple[list[float], Result]:
+    """The times of some calls, of one if it is the first, and what the last one made."""
+    times = list[float]()
+    while not times or (turn > 0 and len(times) < _CALLS and sum(times) < _MOMENT):
+        seconds, made = call()
+        times.append(seconds)
+    return times, made
+
+
 def drawing(draw: peers.Draw, scene: Scene, size: Size) -> Lane:
     """The lane of a picture; if what is drawn is smaller than the size, its time is scaled up."""
     views = cycle(cameras(scene))
 
     def lane(turn: int) -> tuple[float, float]:
-        times, part = list[float](), 1.0
-        while not times or (turn > 0 and len(times) < _CALLS and sum(times) < _MOMENT):
-            seconds, picture = clocked(partial(draw, next(views)))
-            times.append(seconds)
-            part = picture.size // 3 / pixels(size)
-        return sum(times), median(times) / part
+        times, picture = _in_a_row(turn, lambda: clocked(partial(draw, next(views))))
+        return sum(times), median(times) * pixels(size) / (picture.size // 3)
 
     return lane
 
@@ -401,19 +406,20 @@ def hits(effort: Effort, seed: int, progress: Progress) -> Iterator[Section | Ch
     for n in effort.spheres:
         progress(f"eye_hits, {n:,} spheres")
         scene = spread(n, seed)
-        views = [replace(scene, camera=camera) for camera in cameras(scene)]
         kept = eye_hits(scene, *effort.size)
-        lanes = {"eye_hits, out=": _hits_lane(views, effort.size, kept), "eye_hits": _hits_lane(views, effort.size)}
+        lanes = {"eye_hits, out=": _hits_lane(scene, effort.size, kept), "eye_hits": _hits_lane(scene, effort.size)}
         timings = interleaved(lanes, effort.rounds, effort.seconds)
         rows += rows_of(timings, n, effort.size, pixels(effort.size))
     title = f"Hits: t to the last digit and index, {named(effort.size)}"
     yield Section("hits", title, "ray", "", "", tuple(rows))
 
 
-def _hits_lane(views: list[Scene], size: Size, out: Hits | None = None) -> Callable[[int], tuple[float, float]]:
+def _hits_lane(scene: Scene, size: Size, out: Hits | None = None) -> Lane:
+    views = cycle([replace(scene, camera=camera) for camera in cameras(scene)])
+
     def lane(turn: int) -> tuple[float, float]:
-        seconds, _ = clocked(partial(eye_hits, views[turn % len(views)], *size, out=out))
-        return seconds, seconds
+        times, _ = _in_a_row(turn, lambda: clocked(partial(eye_hits, next(views), *size, out=out)))
+        return sum(times), median(times)
 
     return lane
 
