@@ -1,13 +1,14 @@
 """The same examples at every run: a test that fails once fails again."""
 
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
 
-from raytracer import backend, interpreter, machine_code
-from raytracer.render import warm_up
+from raytracer import backend, interpreter, machine_code, make_plan
+from raytracer.render import hits_of, open_tracer, warm_up
 
 try:
     import fcntl
@@ -39,13 +40,21 @@ def machine_code_of_tests(request):
 
 def compile_together(folder):
     """Make the kernels' machine code, each in one of the processes that run tests; else each would make all of it."""
-    scene, left = interpreter(COURSE[0]), ["hit", "diffuse", "full", "depth", "normal"]
+    scene = interpreter(COURSE[0])
+    left = {stage: partial(warm_up, scene, stage) for stage in ("hit", "diffuse", "full", "depth", "normal", "edges")}
+    left["eye_hits"] = partial(find_hits, scene)
     for wait in (fcntl.LOCK_NB, 0):
         for stage in list(left):
             with (folder / f"{stage}.lock").open("w") as lock, suppress(BlockingIOError):
                 fcntl.flock(lock, fcntl.LOCK_EX | wait)
-                warm_up(scene, stage)
-                left.remove(stage)
+                left[stage]()
+                del left[stage]
+
+
+def find_hits(scene):
+    plan = make_plan(scene, "hit", 16, 16, path=backend.import_kernels())
+    with open_tracer(plan) as tracer:
+        hits_of(plan, tracer, polished=True)
 
 
 @pytest.fixture(params=COURSE + HARD, ids=lambda path: path.stem)
