@@ -360,9 +360,7 @@ class QuickScratch(NamedTuple):
     late_columns: np.ndarray  # int32: those; and at the end, some that `kernels.doubts` has decided
     late_rows: np.ndarray  # int32
     spheres: np.ndarray  # int32, what they show
-    slopes: (
-        np.ndarray
-    )  # float64, flat: hu, its rest, hv, its rest of each of the tile's list, see `fine`; the first free
+    slopes: np.ndarray  # float64, flat: hu, its rest, hv, its rest of each of the list, see `fine`; the first is free
     sides: np.ndarray  # float64, flat: hw, its rest, c, its rest
     ids: np.ndarray  # int32, the numbers of those spheres; the first is −1
 

@@ -20,7 +20,7 @@ from pathlib import Path
 from statistics import median, quantiles
 from tempfile import TemporaryDirectory
 from time import sleep
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -34,6 +34,8 @@ from raytracer.render import draw, eye_hits, render_scene, warm_up
 from raytracer.scene import Camera, Light, Materials, Scene, Spheres
 from raytracer.stages import STAGES
 from raytracer.trace import ray_intersect_scene
+
+View = TypeVar("View")
 
 OURS, REFERENCE = "raytracer", "haines"
 NEAR, FAR, WIDE, TALL = 3.0, 23.0, 16, 9
@@ -224,11 +226,11 @@ def calling(work: Callable[[], object]) -> Lane:
     return lane
 
 
-def _in_a_row(turn: int, call: Callable[[], tuple[float, Result]]) -> tuple[list[float], Result]:
-    """The times of some calls, of one if it is the first, and what the last one made."""
+def _in_a_row(turn: int, call: Callable[[View], Result], views: Iterator[View]) -> tuple[list[float], Result]:
+    """The times of some calls, each with the next view, of one if it is the first; and what the last one made."""
     times = list[float]()
     while not times or (turn > 0 and len(times) < _CALLS and sum(times) < _MOMENT):
-        seconds, made = call()
+        seconds, made = clocked(partial(call, next(views)))
         times.append(seconds)
     return times, made
 
@@ -238,7 +240,7 @@ def drawing(draw: peers.Draw, scene: Scene, size: Size) -> Lane:
     views = cycle(cameras(scene))
 
     def lane(turn: int) -> tuple[float, float]:
-        times, picture = _in_a_row(turn, lambda: clocked(partial(draw, next(views))))
+        times, picture = _in_a_row(turn, draw, views)
         return sum(times), median(times) * pixels(size) / (picture.size // 3)
 
     return lane
@@ -418,7 +420,7 @@ def _hits_lane(scene: Scene, size: Size, out: Hits | None = None) -> Lane:
     views = cycle([replace(scene, camera=camera) for camera in cameras(scene)])
 
     def lane(turn: int) -> tuple[float, float]:
-        times, _ = _in_a_row(turn, lambda: clocked(partial(eye_hits, next(views), *size, out=out)))
+        times, _ = _in_a_row(turn, lambda view: eye_hits(view, *size, out=out), views)
         return sum(times), median(times)
 
     return lane

@@ -246,22 +246,20 @@ def fine_columns(raster: Raster) -> Twofold:
 @lru_cache(maxsize=8)
 def fine_rows(raster: Raster) -> tuple[Twofold, Twofold, Twofold]:
     """V·v − d·w of each row in two-fold float64: for each component two arrays (height,)."""
-    _, up = raster.numerators(0, np.arange(raster.height))
-    fine_up, back = _ratio(up.astype(float), float(raster.whole_height)), focal_length(raster.camera.fov)
-    x, y, z = (fine_rest(fine_up, v, w, back) for v, w in zip(raster.camera.v, raster.camera.w, strict=True))
+    up, back = fine_heights(raster), focal_length(raster.camera.fov)
+    x, y, z = (fine_rest(up, v, w, back) for v, w in zip(raster.camera.v, raster.camera.w, strict=True))
     return x, y, z
+
+
+def fine_heights(raster: Raster) -> Twofold:
+    """V of each row in two-fold float64: two arrays (height,)."""
+    _, up = raster.numerators(0, np.arange(raster.height))
+    return _ratio(up.astype(float), float(raster.whole_height))
 
 
 def fine_rest(up: Twofold, v: Number, w: Number, back: Number) -> Twofold:
     """One component of V·v − d·w, from twofold V."""
     return add(*multiply(*up, v, 0.0), *two_product(-back, w))
-
-
-@lru_cache(maxsize=8)
-def fine_columns_and_rows(raster: Raster) -> tuple[np.ndarray, np.ndarray]:
-    """The rests of U of each column, and of V of each row."""
-    _, up = raster.numerators(0, np.arange(raster.height))
-    return fine_columns(raster)[1], _ratio(up.astype(float), float(raster.whole_height))[1]
 
 
 def twofold_eye_rays(raster: Raster, xs: np.ndarray, ys: np.ndarray) -> TwofoldRays:

@@ -50,7 +50,7 @@ from raytracer.arrays import (
     aligned,
 )
 from raytracer.boxes import Lens, make_lens
-from raytracer.camera import Raster, columns_and_rows, fine_columns_and_rows, grid_of
+from raytracer.camera import Raster, columns_and_rows, fine_columns, fine_heights, grid_of
 from raytracer.eye import bundle_of, usable_spread
 from raytracer.facets import exact_volume
 from raytracer.full import surfaces_of, terms_of
@@ -176,11 +176,12 @@ class Screen(NamedTuple):
     def hits(self, rows: slice, worker: int = 0, polished: bool = False) -> Hits:
         """What the rays of these rows, cut between tiles, hit first: as `Eye.hits`."""
         shape = rows.stop - rows.start, self.raster.width
-        hunt = self.hunt(Hits(np.empty(shape), np.empty(shape, np.int32)), "fine" if polished else "rough", rows.start)
+        hits = Hits(np.empty(shape), np.empty(shape, np.int32))
+        hunt = self.hunt(hits, "fine" if polished else "rough", rows.start)
         hunt.find(rows, worker)
         hunt.decide(worker)
         hunt.polish()
-        return self.in_scene(hunt.hits)
+        return self.in_scene(hits)
 
     @_NOT_A_NUMBER_IS_NO_ERROR
     def hunt(self, hits: Hits, kind: str, first_row: int = 0) -> Hunt:
@@ -191,8 +192,9 @@ class Screen(NamedTuple):
         """
         flat = HitRows(hits.t.reshape(-1), hits.index.reshape(-1), first_row, self.raster.width, np.zeros(1, np.int64))
         if kind == "rough":
-            return Hunt(self, hits, flat, "find_hits", _NO_PAINTS)
-        return Hunt(self, hits, flat, "find_shapes" if kind == "shapes" else "find_fine_hits", self._fine_rays())
+            return Hunt(self, flat, "find_hits", _NO_PAINTS)
+        kernel = "find_shapes" if kind == "shapes" else "find_fine_hits"
+        return Hunt(self, flat, kernel, _fine_rays(self.raster, self.unit))
 
     def room_for_hits(self, has_t: bool) -> Hits:
         """Flat arrays for the hits of all pixels, and some elements to spare; without t, that is empty."""
@@ -204,9 +206,6 @@ class Screen(NamedTuple):
         """The smallest and the largest t of all hits."""
         near, far = self.kernels.range_of(t.reshape(-1), index.reshape(-1))
         return near, far
-
-    def _fine_rays(self) -> FineRays:
-        return _fine_rays(self.raster, self.unit)
 
     @_NOT_A_NUMBER_IS_NO_ERROR
     def in_scene(self, hits: Hits) -> Hits:
@@ -267,8 +266,7 @@ class Hunt(NamedTuple):
     """The hits of a screen, or of some of its rows, while a kernel looks for them."""
 
     screen: Screen
-    hits: Hits  # (rows, width); of t there may be nothing
-    flat: HitRows  # the same
+    out: HitRows
     kernel: str
     paints: Paints | FineRays
 
@@ -276,24 +274,24 @@ class Hunt(NamedTuple):
     def find(self, rows: slice, worker: int = 0, call: Call = alone) -> None:
         """Look for what these rows hit; what is left to do, `decide` does, and at the end `polish`."""
         tiles = self.screen.tiles_of(rows)
-        for doubtful in self.screen.paint(self.kernel, tiles, self.paints, self.flat, worker, call):
-            doubtful.decide(self.hits, self.flat.first_row)
+        for doubtful in self.screen.paint(self.kernel, tiles, self.paints, self.out, worker, call):
+            doubtful.decide(self.out)
 
     @_NOT_A_NUMBER_IS_NO_ERROR
     def decide(self, *workers: int) -> None:
         """Decide what these workers have listed as doubtful."""
         for doubtful in self.screen.doubtful(*workers):
-            doubtful.decide(self.hits, self.flat.first_row)
+            doubtful.decide(self.out)
 
     @_NOT_A_NUMBER_IS_NO_ERROR
     def polish(self) -> None:
         """Bring to the last digit what kernels have left, once all rows are found: before, there may be anything."""
-        if self.flat.is_left[0]:
-            t = self.hits.t
-            ys, xs = np.nonzero(np.isnan(t))
-            some, pixels = Hits(t[ys, xs], self.hits.index[ys, xs]), Pixels(self.screen, xs, ys + self.flat.first_row)
-            polish(some, (np.arange(len(xs)),), pixels, self.screen.targets)
-            t[ys, xs] = some.t
+        out = self.out
+        if out.is_left[0]:
+            left = np.flatnonzero(np.isnan(out.t))
+            some, (ys, xs) = Hits(out.t[left], out.index[left]), np.divmod(left, out.width)
+            polish(some, (np.arange(len(left)),), Pixels(self.screen, xs, ys + out.first_row), self.screen.targets)
+            out.t[left] = some.t
 
 
 class Pixels(NamedTuple):
@@ -308,12 +306,12 @@ class Pixels(NamedTuple):
         """What they hit, certain."""
         return settled(self, (np.arange(len(self.xs)),), self.screen.targets)
 
-    def decide(self, hits: Hits, first_row: int) -> None:
-        """Put what they hit into the hits of the rows from first_row on."""
-        where, found = (self.ys - first_row, self.xs), self.hits()
-        hits.index[where] = found.index
-        if hits.t.size:
-            hits.t[where] = found.t
+    def decide(self, out: HitRows) -> None:
+        """Put what they hit among other hits."""
+        where, found = (self.ys - out.first_row) * out.width + self.xs, self.hits()
+        out.index[where] = found.index
+        if len(out.t):
+            out.t[where] = found.t
 
     def bundle(self, which: Index) -> Bundle:
         screen = self.screen
@@ -408,8 +406,8 @@ def _fine_rays(raster: Raster, unit: int) -> FineRays:
 
 @lru_cache(maxsize=8)
 def _spare_rests(raster: Raster) -> tuple[np.ndarray, np.ndarray]:
-    """With eight columns to spare."""
-    across, up = fine_columns_and_rows(raster)
+    """The rests of U, with eight columns to spare, and of V."""
+    (_, across), (_, up) = fine_columns(raster), fine_heights(raster)
     return np.append(across, np.zeros(SPARE)), up
 
 

@@ -1,7 +1,7 @@
 """Arithmetic with twice the digits: a number is the unevaluated sum of two float64, `high + low`.
 
 Every function here takes numbers or numpy arrays alike and uses nothing but + − × ÷ and the square root, each correctly
-rounded. So numpy runs it on arrays, the compiler on single numbers, and both get the same bits.
+rounded. So numpy runs it on arrays, the compiler on single numbers, and both get the same bits (not of `times_plus`).
 
 Sources: the error-free sums and products are Knuth's and Dekker's; names and error bounds (u = 2⁻⁵³) are those of
 M. Joldes, J.-M. Muller, V. Popescu, "Tight and rigorous error bounds for basic building blocks of double-word

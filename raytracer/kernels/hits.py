@@ -148,10 +148,12 @@ def _put_strips(view, bins, tile, extremes, rays, scratch, doubts, out):
     """The same of a tile in single precision: what its strips hold are numbers of its list, counted from 1."""
     align_stack()
     sheet, quick = scratch.quick, rays.quick
-    tabulate(view, bins, tile, quick, sheet)
+    _list_ids(bins, tile, sheet)
+    if has_t:
+        _tabulate(view, bins, tile, quick, sheet)
     frame = fine.frame_of(quick.u, quick.v, quick.w, quick.back)
     for row in range(tile.top, tile.bottom):
-        start, line = _start_of(out, row), line_of(view, rays, row, frame)
+        start, line = _start_of(out, row), _line_of(view, rays, row, frame)
         for x in range(tile.left, tile.right, WIDTH):
             number, at, room = _number_of(sheet, tile, row, x), start + np.uint64(x), tile.right - x
             hit, index, t = is_hit(number + _BELOW), spread(_BELOW), spread(np.inf)
@@ -182,7 +184,7 @@ def _ids(sheet, which):
 
 
 @called
-def _tabulate_ids(view, bins, tile, quick, sheet):
+def _list_ids(bins, tile, sheet):
     """Which spheres those of the list are."""
     first, end = bins.starts[tile.number], bins.middles[tile.number]
     for at in range(first, end, WIDTH):
@@ -190,13 +192,11 @@ def _tabulate_ids(view, bins, tile, quick, sheet):
 
 
 @called
-def _tabulate_all(view, bins, tile, quick, sheet):
-    """And how rays from the eye see them."""
-    first, end = bins.starts[tile.number], bins.middles[tile.number]
-    for at in range(first, end, WIDTH):
-        where, row = load_low(bins.entries, np.uint64(at)), np.uint64(at - first + 1)
-        store(sheet.ids, row, where)
-        cx, cy, cz, radius = gather_rows(view.balls, where)
+def _tabulate(view, bins, tile, quick, sheet):
+    """How rays from the eye see the spheres of the list."""
+    count = bins.middles[tile.number] - bins.starts[tile.number]
+    for row in range(np.uint64(1), np.uint64(count + 1), np.uint64(WIDTH)):
+        cx, cy, cz, radius = gather_rows(view.balls, load(sheet.ids, row))
         hu, hv, hw, c = fine.seen(view.eye, (cx, cy, cz), radius, quick.u, quick.v, quick.w, quick.back)
         store_rows(sheet.slopes, row, hu[0], hu[1], hv[0], hv[1])
         store_rows(sheet.sides, row, hw[0], hw[1], c[0], c[1])
@@ -242,7 +242,5 @@ def _list(view, row, x, bits, room, doubts):
             doubts[doubts[0]] = row * width + x + pixel
 
 
-_put_shapes = variant(_put_strips, "_put_shapes", tabulate=_tabulate_ids, line_of=_line_of, has_t=False)
-_put_fine_hits = variant(_put_strips, "_put_fine_hits", tabulate=_tabulate_all, line_of=_line_of, has_t=True)
-shapes_quickly = hits_quickly("shapes_quickly", _put_shapes)
-fine_hits_quickly = hits_quickly("fine_hits_quickly", _put_fine_hits)
+shapes_quickly = hits_quickly("shapes_quickly", variant(_put_strips, "_put_shapes", has_t=False))
+fine_hits_quickly = hits_quickly("fine_hits_quickly", variant(_put_strips, "_put_fine_hits", has_t=True))
